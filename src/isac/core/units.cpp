@@ -1,0 +1,3 @@
+#include "isac/core/units.hpp"
+
+namespace isac {}

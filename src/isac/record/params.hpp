@@ -1,0 +1,40 @@
+/// @file
+/// `params.toml` (`isac.params/1`): the identified parameters that every program and the controller read.
+///
+/// Each value has: value, unit, standard error, 95 % interval, the SHA-256 of the recordings it came from, and the box
+/// (Δp, φ, φ̇) in which it holds. Written atomically (temporary file, fsync, rename), the old file kept as `.bak`; reading
+/// back gives the same bits. Sections: `[[joint]]` (one per joint), `[pcu]`, `[gains]`, `[masses]`, `[[effects]]`; sections
+/// this program does not know are kept and written back unchanged. Throws isac::Error (bad input).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "isac/core/estimated.hpp"
+
+namespace isac::record {
+
+struct ParamsSection {
+  std::string name;                  ///< "joint", "pcu", "gains", "masses", "effects"
+  std::string label;                 ///< which joint or effect: "testbed", "1", "coulomb_friction"
+  std::vector<Estimated> values;
+  std::vector<std::string> sources;  ///< "sha256:<64 hex digits> file.csv"
+  ValidityBox box;
+  std::vector<std::pair<std::string, double>> constants;  ///< SI: {"wheel_radius_m", 0.019}, {"initial_pressure_Pa", …}
+};
+
+struct Params {
+  std::string created;  ///< ISO 8601
+  std::vector<ParamsSection> sections;
+  [[nodiscard]] const ParamsSection* find(const std::string& name, const std::string& label = {}) const;
+};
+
+[[nodiscard]] Params read_params(const std::filesystem::path& path);
+[[nodiscard]] Params parse_params(const std::string& text, const std::string& file_name);
+[[nodiscard]] std::string format_params(const Params& params);
+/// Replaces sections of the same name and label in the file (if it exists), keeps the others, writes atomically.
+void update_params(const std::filesystem::path& path, const Params& fresh);
+
+}  // namespace isac::record
