@@ -3,13 +3,17 @@
 ///
 ///   value_SI = value · scale + offset
 ///
-/// Grammar of a unit text: factors joined by `*` or a space, at most one `/` (everything behind it divides), an integer
-/// exponent behind a factor with or without `^`: "N m", "Nm", "N*m", "kg m2", "kg m^2", "rad/s", "N s/m", "m/s2".
-/// The seed's force-kilogram pressures are words of their own: kg/cm2 = kgf/cm2 = 98066.5 Pa, kgf = 9.80665 N, and the
-/// model's B in "N cm2/kg" means N per kgf/cm2. `-` and `1` are dimensionless, `%` is 0.01.
-/// Angle (rad) and raw counts are dimensions of their own, so that `angle [m]` or `torque [rad]` is an error.
-/// Units known: s ms us min h Hz; rad deg turn count; rpm; Pa kPa MPa bar mbar psi atm kg/cm2 kgf/cm2; N kN kgf lbf;
-/// m cm mm in; kg g; A mA; V mV; K degC; 1 - %.
+/// Grammar of a unit text: factors joined by `*` or a space, at most one `/` (everything behind it divides),
+/// an integer exponent behind a factor with or without `^`: "N m", "Nm", "N*m", "kg m2", "kg m^2", "rad/s",
+/// "N s/m", "m/s2". The seed's force-kilogram pressures are words of their own: kg/cm2 = kgf/cm2 = 98066.5
+/// Pa, kgf = 9.80665 N, and the model's B in "N cm2/kg" means N per kgf/cm2. `-` and `1` are dimensionless,
+/// `%` is 0.01. Angle (rad) and raw counts are dimensions of their own, so that `angle [m]` or `torque [rad]`
+/// is an error. Units known: s ms us min h Hz; rad deg turn count; rpm; Pa kPa MPa bar mbar psi atm kg/cm2
+/// kgf/cm2; N kN kgf lbf; m cm mm in; kg g; A mA; V mV; K degC; 1 - %. The exponent may also be a superscript
+/// (`N cm²/kg`), `·` multiplies too. kg against cm2 (one multiplies, the other divides) is the
+/// force-kilogram; kg elsewhere is a mass ("kg m2", "kg cm2"). degC stands alone only, since its zero is not
+/// that of K; for differences and rates write K. Scales are quotients of exact integers wherever the
+/// definition allows, so each is the nearest double.
 ///
 /// Real time: no heap, no lock, noexcept. Errors: an unknown text gives std::nullopt.
 /// Source: docs/formats.md. Example: `parse_unit("kg/cm2")->scale == 98066.5`.
