@@ -1,4 +1,5 @@
-// isac-identify: parameters of joints, valve units, muscles and sensors from recordings (docs/reference/isac-identify.md).
+// isac-identify: parameters of joints, valve units, muscles and sensors from recordings
+// (docs/reference/isac-identify.md).
 #include <CLI/CLI.hpp>
 #include <string>
 #include <utility>

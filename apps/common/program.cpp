@@ -57,12 +57,14 @@ void require_writable(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
-    throw Error(ErrorKind::kUsage, "output_is_a_folder", "the output is a folder; name a file in it", {path, 0, 0});
+    throw Error(ErrorKind::kUsage, "output_is_a_folder", "the output is a folder; name a file in it",
+                {path, 0, 0});
   }
   const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
   if (!fs::is_directory(folder, ignored)) {
     throw Error(ErrorKind::kUsage, "output_folder_missing",
-                "the folder '" + folder.string() + "' does not exist; create it or name another", {path, 0, 0});
+                "the folder '" + folder.string() + "' does not exist; create it or name another",
+                {path, 0, 0});
   }
 }
 
@@ -82,7 +84,8 @@ int run_program(CLI::App& app, int argc, char** argv, const std::string& json_pa
   } catch (const CLI::ParseError& wrong) {
     std::string text = wrong.what();
     while (!text.empty() && (text.back() == '\n' || text.back() == '.')) text.pop_back();
-    return report_error(app, Error(ErrorKind::kUsage, "usage", text + "; see --help"), json_path_of(argc, argv));
+    return report_error(app, Error(ErrorKind::kUsage, "usage", text + "; see --help"),
+                        json_path_of(argc, argv));
   }
   try {
     return body();

@@ -1,5 +1,6 @@
 /// @file
-/// The subcommands of isac-identify: each adds its words to the program and returns what runs when it is called.
+/// The subcommands of isac-identify: each adds its words to the program and returns what runs when it is
+/// called.
 #pragma once
 
 #include <functional>

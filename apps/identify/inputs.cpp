@@ -24,7 +24,8 @@ std::vector<fs::path> csv_files_in(const fs::path& folder) {
   }
   if (failure) {
     throw Error(ErrorKind::kBadInput, "folder_unreadable",
-                "the folder cannot be read (" + failure.message() + "); check its permissions", {folder.string(), 0, 0});
+                "the folder cannot be read (" + failure.message() + "); check its permissions",
+                {folder.string(), 0, 0});
   }
   std::sort(found.begin(), found.end());
   return found;
@@ -45,8 +46,8 @@ Files find_files(const std::vector<std::string>& arguments, const std::vector<st
     const fs::path folder(argument);
     const auto runs = csv_files_in(folder);
     if (runs.empty()) {
-      throw Error(ErrorKind::kBadInput, "dataset_empty", "the dataset folder holds no *.csv; name one that does",
-                  {argument, 0, 0});
+      throw Error(ErrorKind::kBadInput, "dataset_empty",
+                  "the dataset folder holds no *.csv; name one that does", {argument, 0, 0});
     }
     files.runs.insert(files.runs.end(), runs.begin(), runs.end());
     if (fs::is_directory(folder / "heldout", ignored)) {
@@ -66,7 +67,8 @@ std::vector<record::ColumnMap> parse_maps(const std::vector<std::string>& maps) 
   return parsed;
 }
 
-std::vector<series::Recording> read_all(const std::vector<fs::path>& paths, const record::ReadOptions& options) {
+std::vector<series::Recording> read_all(const std::vector<fs::path>& paths,
+                                        const record::ReadOptions& options) {
   std::vector<series::Recording> recordings;
   recordings.reserve(paths.size());
   for (const fs::path& path : paths) recordings.push_back(record::read_recording(path, options));
@@ -98,16 +100,19 @@ estimate::JointRun joint_run(const series::Recording& recording, const JointSign
   const series::Column* output = recording.find(signals.output);
   if (output != nullptr) {
     run.output = output->values;
-  } else if (signals.output == "torque" && recording.find("F1") != nullptr && recording.find("F2") != nullptr) {
+  } else if (signals.output == "torque" && recording.find("F1") != nullptr &&
+             recording.find("F2") != nullptr) {
     if (!(signals.wheel_radius > 0)) {
       throw Error(ErrorKind::kBadInput, "wheel_missing",
-                  "has forces but no torque, and no chain wheel is known; give --rig rig.toml with chain_wheel_diameter",
+                  "has forces but no torque, and no chain wheel is known; give --rig rig.toml with "
+                  "chain_wheel_diameter",
                   {recording.source, 0, 0});
     }
     const auto& F1 = recording.column("F1").values;
     const auto& F2 = recording.column("F2").values;
     run.output.resize(F1.size());
-    for (std::size_t i = 0; i < F1.size(); ++i) run.output[i] = (F2[i] - F1[i]) * signals.wheel_radius;  // T = (F2 − F1) r
+    for (std::size_t i = 0; i < F1.size(); ++i)
+      run.output[i] = (F2[i] - F1[i]) * signals.wheel_radius;  // T = (F2 − F1) r
   } else {
     run.output = recording.column(signals.output).values;  // throws and names what is missing
   }
@@ -117,12 +122,15 @@ estimate::JointRun joint_run(const series::Recording& recording, const JointSign
 std::vector<std::string> sources_of(const std::vector<series::Recording>& recordings) {
   std::vector<std::string> sources;
   for (const series::Recording& recording : recordings) {
-    if (!recording.sha256.empty()) sources.push_back("sha256:" + recording.sha256 + " " + short_name(recording.source));
+    if (!recording.sha256.empty())
+      sources.push_back("sha256:" + recording.sha256 + " " + short_name(recording.source));
   }
   return sources;
 }
 
-std::string short_name(const std::string& path) { return fs::path(path).filename().string(); }
+std::string short_name(const std::string& path) {
+  return fs::path(path).filename().string();
+}
 
 std::string now_iso8601() {
   const auto now = std::chrono::time_point_cast<std::chrono::seconds>(std::chrono::system_clock::now());

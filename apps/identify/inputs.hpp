@@ -1,8 +1,8 @@
 /// @file
 /// From the words of a call to the runs that a fit speaks of: dataset folders, --map, --rig, joint runs.
 ///
-/// A dataset is a folder: `rig.toml`, `*.csv`, and, if there, `heldout/*.csv`, never used for fitting (docs/formats.md).
-/// Throws isac::Error: usage (nothing to read), bad input (what is read cannot be used).
+/// A dataset is a folder: `rig.toml`, `*.csv`, and, if there, `heldout/*.csv`, never used for fitting
+/// (docs/formats.md). Throws isac::Error: usage (nothing to read), bad input (what is read cannot be used).
 #pragma once
 
 #include <filesystem>
@@ -24,8 +24,8 @@ struct Files {
 };
 
 /// Arguments may be files and dataset folders; `heldout` and `rig` add to what the folders hold.
-[[nodiscard]] Files find_files(const std::vector<std::string>& arguments, const std::vector<std::string>& heldout,
-                               const std::string& rig);
+[[nodiscard]] Files find_files(const std::vector<std::string>& arguments,
+                               const std::vector<std::string>& heldout, const std::string& rig);
 
 [[nodiscard]] std::vector<record::ColumnMap> parse_maps(const std::vector<std::string>& maps);
 
@@ -35,10 +35,10 @@ struct Files {
 
 /// Which signals of a recording are output and position, and the wheel that turns forces into torque.
 struct JointSignals {
-  std::string output = "torque";   ///< computed from F1, F2 and the wheel radius where the column is absent
+  std::string output = "torque";  ///< computed from F1, F2 and the wheel radius where the column is absent
   std::string position = "angle";
-  bool needs_pressure = true;      ///< the terms contain one of the pressures
-  double wheel_radius = 0;         ///< m
+  bool needs_pressure = true;  ///< the terms contain one of the pressures
+  double wheel_radius = 0;     ///< m
 };
 
 [[nodiscard]] estimate::JointRun joint_run(const series::Recording& recording, const JointSignals& signals);

@@ -13,6 +13,7 @@
 #include "common/program.hpp"
 #include "identify/commands.hpp"
 #include "identify/inputs.hpp"
+#include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/joint_fit.hpp"
@@ -45,14 +46,16 @@ estimate::Loss parse_loss(const std::string& text) {
   } else if (kind == "squared") {
     loss.kind = estimate::Loss::Kind::kSquared;
   } else {
-    throw Error(ErrorKind::kUsage, "loss_unknown",
-                "the loss '" + text + "' is not known; use huber, cauchy or squared, with a scale as in huber:0.05");
+    throw Error(
+        ErrorKind::kUsage, "loss_unknown",
+        "the loss '" + text + "' is not known; use huber, cauchy or squared, with a scale as in huber:0.05");
   }
   if (const auto colon = text.find(':'); colon != std::string::npos) {
     char* end = nullptr;
     loss.scale = std::strtod(text.c_str() + colon + 1, &end);
     if (*end != '\0' || !(loss.scale > 0)) {
-      throw Error(ErrorKind::kUsage, "loss_scale", "the scale in --loss " + text + " must be a positive number");
+      throw Error(ErrorKind::kUsage, "loss_scale",
+                  "the scale in --loss " + text + " must be a positive number");
     }
   }
   return loss;
@@ -64,10 +67,11 @@ estimate::DifferentiatorChoice parse_differentiator(const std::string& text) {
   if (text.empty()) return choice;
   int used = 0;
   if (std::sscanf(text.c_str(), "%d:%d%n", &choice.window, &choice.order, &used) != 2 ||
-      used != static_cast<int>(text.size()) || choice.window < 5 || choice.window % 2 == 0 || choice.order < 1 ||
-      choice.order >= choice.window || choice.order > 5) {
-    throw Error(ErrorKind::kUsage, "differentiator",
-                "--differentiator " + text + " must be WINDOW:ORDER with an odd window of 5 or more, e.g. 41:3");
+      used != static_cast<int>(text.size()) || choice.window < 5 || choice.window % 2 == 0 ||
+      choice.order < 1 || choice.order >= choice.window || choice.order > 5) {
+    throw Error(
+        ErrorKind::kUsage, "differentiator",
+        "--differentiator " + text + " must be WINDOW:ORDER with an odd window of 5 or more, e.g. 41:3");
   }
   return choice;
 }
@@ -104,57 +108,52 @@ record::Params params_of(const estimate::JointFit& fit, const record::Rig& rig,
 
 nlohmann::ordered_json details_of(const estimate::JointFit& fit) {
   using nlohmann::ordered_json;
-  const auto number = [](double value) { return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr); };
   ordered_json extra;
-  extra["noise_floor"] = number(fit.noise_floor);
+  extra["noise_floor"] = json_number(fit.noise_floor);
   extra["outliers"] = fit.outliers;
-  extra["blocks"] = {{"count", fit.blocks}, {"seconds", number(fit.block_seconds)}};
+  extra["blocks"] = {{"count", fit.blocks}, {"seconds", json_number(fit.block_seconds)}};
   extra["differentiator"] = fit.differentiator;
   ordered_json correlation = ordered_json::array();
   const std::size_t n = fit.parameters.size();
   for (std::size_t i = 0; i < n && fit.correlation.size() == n * n; ++i) {
     ordered_json row = ordered_json::array();
-    for (std::size_t j = 0; j < n; ++j) row.push_back(number(fit.correlation[i * n + j]));
+    for (std::size_t j = 0; j < n; ++j) row.push_back(json_number(fit.correlation[i * n + j]));
     correlation.push_back(row);
   }
   extra["correlation"] = correlation;
-  extra["valid"] = {{"delta_pressure_Pa", {number(fit.box.delta_pressure_low), number(fit.box.delta_pressure_high)}},
-                    {"angle_rad", {number(fit.box.angle_low), number(fit.box.angle_high)}},
-                    {"speed_rad_s", {number(fit.box.speed_low), number(fit.box.speed_high)}}};
+  extra["valid"] = {{"delta_pressure_Pa",
+                     {json_number(fit.box.delta_pressure_low), json_number(fit.box.delta_pressure_high)}},
+                    {"angle_rad", {json_number(fit.box.angle_low), json_number(fit.box.angle_high)}},
+                    {"speed_rad_s", {json_number(fit.box.speed_low), json_number(fit.box.speed_high)}}};
   extra["tests"] = ordered_json::array();
   for (const estimate::ResidualTest& test : fit.tests) {
     extra["tests"].push_back({{"name", test.name},
-                              {"statistic", number(test.statistic)},
-                              {"p_value", number(test.p_value)},
+                              {"statistic", json_number(test.statistic)},
+                              {"p_value", json_number(test.p_value)},
                               {"passed", test.passed},
                               {"text", test.sentence}});
   }
   extra["runs"] = ordered_json::array();
   for (const estimate::RunResidual& run : fit.runs) {
-    extra["runs"].push_back({{"file", run.name}, {"heldout", run.heldout}, {"rmse", number(run.rmse)}});
+    extra["runs"].push_back({{"file", run.name}, {"heldout", run.heldout}, {"rmse", json_number(run.rmse)}});
   }
   if (!fit.cut.velocity.empty()) {
-    extra["velocity_cut"] = {{"C", number(fit.cut.C.value)}, {"C_std_error", number(fit.cut.C.std_error)},
-                             {"D", number(fit.cut.D.value)}, {"D_std_error", number(fit.cut.D.std_error)}};
+    extra["velocity_cut"] = {{"C", json_number(fit.cut.C.value)},
+                             {"C_std_error", json_number(fit.cut.C.std_error)},
+                             {"D", json_number(fit.cut.D.value)},
+                             {"D_std_error", json_number(fit.cut.D.std_error)}};
   }
   return extra;
 }
 
 void print_summary(const estimate::JointFit& fit, const std::string& unit) {
-  fmt::print("{:<22}{:>14}  {:>12}  {:<26} {}\n", "parameter", "value", "std. error", "95 % interval", "unit");
-  for (const Estimated& p : fit.parameters) {
-    if (p.identifiable) {
-      fmt::print("{:<22}{:>14.6g}  {:>12.3g}  {:<26} {}\n", p.name, p.value, p.std_error,
-                 fmt::format("[{:.6g}, {:.6g}]", p.ci_low, p.ci_high), p.unit);
-    } else {
-      fmt::print("{:<22}{:>14}  {}\n", p.name, "refused", p.reason);
-    }
-  }
+  print_parameters(fit.parameters);
   fmt::print("rmse {:.4g} {} over {} rows", fit.rmse, unit, fit.samples);
   if (std::isfinite(fit.heldout_rmse)) fmt::print(", {:.4g} {} on held-out runs", fit.heldout_rmse, unit);
   fmt::print("; noise floor {:.4g} {}\n", fit.noise_floor, unit);
-  for (const estimate::ResidualTest& test : fit.tests) fmt::print("{} {}\n", test.passed ? "·" : "!", test.sentence);
-  for (const Warning& warning : fit.warnings) fmt::print("! {}\n", warning.text);
+  for (const estimate::ResidualTest& test : fit.tests)
+    fmt::print("{} {}\n", test.passed ? "·" : "!", test.sentence);
+  print_warnings(fit.warnings);
 }
 
 int run_joint(const Call& call, const std::string& json_path) {
@@ -200,20 +199,23 @@ int run_joint(const Call& call, const std::string& json_path) {
   } else if (signals.output == "torque" && std::isfinite(rig.sensors.force_noise)) {
     options.noise.output = std::sqrt(2.0) * rig.sensors.force_noise * options.wheel_radius;  // of (F2 − F1) r
   }
-  if (std::isfinite(rig.sensors.pressure_noise)) options.noise.delta_pressure = rig.sensors.pressure_noise / std::sqrt(2.0);
+  if (std::isfinite(rig.sensors.pressure_noise))
+    options.noise.delta_pressure = rig.sensors.pressure_noise / std::sqrt(2.0);
   if (signals.position == "angle" && !files.rig.empty()) {
     const double step = 2 * kPi / rig.encoder.steps_per_turn;
     const double extra = std::isfinite(rig.sensors.angle_noise) ? rig.sensors.angle_noise : 0.0;
     options.noise.angle = std::hypot(step / std::sqrt(12.0), extra);
   }
 
-  const record::ReadOptions reading{.map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};
+  const record::ReadOptions reading{
+      .map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};
   std::vector<estimate::JointRun> runs, heldout;
   std::vector<series::Recording> recordings = read_all(files.runs, reading);
   Warnings left_out;
   for (const series::Recording& recording : recordings) {
     if (recording.meta("experiment") == "pcu-step" && files.runs.size() > 1) {
-      left_out.push_back({"run_left_out", short_name(recording.source) + " holds valve steps: use it with isac-identify pcu."});
+      left_out.push_back({"run_left_out", short_name(recording.source) +
+                                              " holds valve steps: use it with isac-identify pcu."});
       continue;
     }
     runs.push_back(joint_run(recording, signals));
@@ -237,7 +239,8 @@ int run_joint(const Call& call, const std::string& json_path) {
     input.options = &options;
     record::write_atomically(call.report, report::render_joint_report(input));
   }
-  if (!call.params.empty()) record::update_params(call.params, params_of(fit, rig, recordings, options.wheel_radius));
+  if (!call.params.empty())
+    record::update_params(call.params, params_of(fit, rig, recordings, options.wheel_radius));
 
   record::Answer answer;
   answer.schema = "isac.joint/1";
@@ -264,17 +267,22 @@ Body add_joint(CLI::App& program, std::string& json_path) {
   sub->add_option("runs", call->runs, "recordings (CSV) or dataset folders")->required();
   sub->add_option("--rig", call->rig, "rig.toml; a dataset folder's own is found by itself");
   sub->add_option("--heldout", call->heldout, "recordings to predict, never to fit");
-  sub->add_option("--terms", call->terms, "terms of the catalogue, e.g. inertia,viscous_damping,coulomb_friction,offset")
+  sub->add_option("--terms", call->terms,
+                  "terms of the catalogue, e.g. inertia,viscous_damping,coulomb_friction,offset")
       ->delimiter(',');
   sub->add_option("--model", call->model, "model.toml that names terms, output and position");
   sub->add_option("--output", call->output, "signal to explain (default torque), e.g. force_motor");
   sub->add_option("--position", call->position, "position signal")->capture_default_str();
   sub->add_option("--map", call->maps, "foreign column, e.g. angle=\"Joint Pos (deg)\":deg");
-  sub->add_option("--loss", call->loss, "huber, cauchy or squared; with a scale as in huber:0.05")->capture_default_str();
-  sub->add_option("--differentiator", call->differentiator, "Savitzky-Golay WINDOW:ORDER (default: chosen and stated)");
-  sub->add_option("--block", call->block_seconds, "seconds per block of the covariance (default: from the residual)")
+  sub->add_option("--loss", call->loss, "huber, cauchy or squared; with a scale as in huber:0.05")
+      ->capture_default_str();
+  sub->add_option("--differentiator", call->differentiator,
+                  "Savitzky-Golay WINDOW:ORDER (default: chosen and stated)");
+  sub->add_option("--block", call->block_seconds,
+                  "seconds per block of the covariance (default: from the residual)")
       ->check(CLI::PositiveNumber);
-  sub->add_flag("--plain-regressors", call->plain_regressors, "take angle, speed and pressure as free of noise");
+  sub->add_flag("--plain-regressors", call->plain_regressors,
+                "take angle, speed and pressure as free of noise");
   sub->add_option("-o,--params", call->params, "params.toml to write or update");
   sub->add_option("--report", call->report, "HTML report to write");
   sub->add_option("--json", json_path, "answer as JSON into a file, - for standard output");
