@@ -1,0 +1,109 @@
+#include "isac/series/signal_summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace isac::series {
+namespace {
+
+std::string text_of(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  return buffer;
+}
+
+SignalSummary summarise(const Column& column) {
+  SignalSummary summary{.name = column.name, .unit = column.unit};
+  double sum = 0;
+  std::size_t count = 0;
+  for (const double value : column.values) {
+    if (!std::isfinite(value)) continue;
+    summary.min = count == 0 ? value : std::min(summary.min, value);
+    summary.max = count == 0 ? value : std::max(summary.max, value);
+    sum += value;
+    ++count;
+  }
+  summary.missing = column.values.size() - count;
+  if (count == 0) return summary;
+  summary.mean = sum / static_cast<double>(count);
+  double squares = 0;  // second pass: no cancellation for a small ripple on a large offset
+  for (const double value : column.values) {
+    if (std::isfinite(value)) squares += (value - summary.mean) * (value - summary.mean);
+  }
+  summary.std = count > 1 ? std::sqrt(squares / static_cast<double>(count - 1)) : 0.0;
+  return summary;
+}
+
+/// Share of samples that sit exactly at the largest or the smallest value: a sensor at its stop repeats one number.
+double share_at(const Column& column, double value) {
+  const auto same = std::count(column.values.begin(), column.values.end(), value);
+  return static_cast<double>(same) / static_cast<double>(column.values.size());
+}
+
+void remark_on_signal(const Column& column, const SignalSummary& summary, Warnings& remarks) {
+  if (summary.missing == column.values.size()) {
+    remarks.push_back({"signal_empty", column.name + " holds no number at all."});
+    return;
+  }
+  if (summary.missing > 0) {
+    const double percent =
+        100.0 * static_cast<double>(summary.missing) / static_cast<double>(column.values.size());
+    remarks.push_back({"samples_missing", column.name + ": " + std::to_string(summary.missing) +
+                                              " samples (" + text_of(percent) + " %) are missing."});
+  }
+  if (summary.min == summary.max) {
+    if (column.values.size() > 1) {
+      remarks.push_back({"signal_constant", column.name + " never changes (" + text_of(summary.min) + " " +
+                                                summary.unit + ")."});
+    }
+    return;
+  }
+  // A resting signal repeats values too; a stop is an extreme that a noisy signal takes again and again.
+  std::vector<double> distinct(column.values);
+  distinct.erase(std::remove_if(distinct.begin(), distinct.end(), [](double v) { return !std::isfinite(v); }),
+                 distinct.end());
+  std::sort(distinct.begin(), distinct.end());
+  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
+  if (distinct.size() < 50 || column.values.size() < 200) return;
+  for (const double extreme : {summary.min, summary.max}) {
+    const double share = share_at(column, extreme);
+    if (share > 0.02) {
+      remarks.push_back({"signal_at_stop", column.name + " stands at " + text_of(extreme) + " " +
+                                               summary.unit + " in " + text_of(100 * share) +
+                                               " % of the samples: a stop of the sensor, or saturation?"});
+    }
+  }
+}
+
+}  // namespace
+
+RecordingSummary summarise(const Recording& recording) {
+  RecordingSummary summary;
+  for (const Column& column : recording.columns) {
+    if (column.name == "time") continue;
+    summary.signals.push_back(summarise(column));
+    remark_on_signal(column, summary.signals.back(), summary.remarks);
+  }
+  const Column* time = recording.find("time");
+  if (time == nullptr || time->values.size() < 2) return summary;
+  std::vector<double> steps(time->values.size() - 1);
+  for (std::size_t i = 0; i + 1 < time->values.size(); ++i) steps[i] = time->values[i + 1] - time->values[i];
+  summary.seconds = time->values.back() - time->values.front();
+  summary.largest_gap = *std::max_element(steps.begin(), steps.end());
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  const double median = *middle;
+  summary.rate = 1.0 / median;
+  const auto gaps =
+      std::count_if(steps.begin(), steps.end(), [median](double step) { return step > 1.5 * median; });
+  if (gaps > 0) {
+    summary.remarks.push_back({"time_gap", std::to_string(gaps) +
+                                               " time steps are longer than 1.5 median steps of " +
+                                               text_of(1000 * median) + " ms; the longest is " +
+                                               text_of(1000 * summary.largest_gap) + " ms."});
+  }
+  return summary;
+}
+
+}  // namespace isac::series
