@@ -3,7 +3,9 @@
 ///
 /// Every dimensional value is a string with its unit ("38 mm"); a bare number, an unknown key or a wrong dimension is an
 /// error with line and column. All sections but `[joint]` may be missing. Values here are SI; NaN means "not given".
-/// Throws isac::Error (bad input). Source: docs/formats.md. Example: `auto rig = isac::record::read_rig("rig.toml");`
+/// Sections: [joint] [encoder] [sensors] [limits] [card] [[calibration]]; example in docs/formats.md.
+/// Threads: pure functions. Throws isac::Error (bad input). Source: docs/formats.md; seed 3.5, E.2, E.3.
+/// Example: `auto rig = isac::record::read_rig("rig.toml");`
 #pragma once
 
 #include <array>
@@ -27,14 +29,14 @@ struct RigEncoder {
   int middle_count = 0;  ///< `middle = "1234 count"`
 };
 
-struct RigSensors {  // standard deviations
+struct RigSensors {                   // standard deviations
   double force_noise = kNotGiven;     ///< N
   double pressure_noise = kNotGiven;  ///< Pa
   double angle_noise = kNotGiven;     ///< rad, beyond the encoder's steps
   double torque_noise = kNotGiven;    ///< N m, for rigs that measure torque itself
 };
 
-struct RigLimits {  // safety limits, seed 3.5 and 6.3
+struct RigLimits {                        // safety limits, seed 3.5 and 6.3
   double delta_pressure = 2.0 * 98066.5;  ///< Pa, |Δp|
   double pressure = 5.0 * 98066.5;        ///< Pa, of either muscle
   double angle = 1.1780972450961724;      ///< rad, 3/8 π
@@ -44,10 +46,16 @@ struct RigLimits {  // safety limits, seed 3.5 and 6.3
 
 /// One linear channel: physical = (count − offset) · gain.
 struct RigChannel {
-  std::string signal;  ///< "F1", "p2", "p1_cmd"
-  std::string channel; ///< "ai0", "ao1"
-  double offset = 0;   ///< count
-  double gain = 1;     ///< SI unit per count
+  std::string signal;   ///< "F1", "p2", "p1_cmd"
+  std::string channel;  ///< "ai0", "ao1"
+  double offset = 0;    ///< count
+  double gain = 1;      ///< SI unit per count
+};
+
+/// Which card the rig hangs on, and how fast it is sampled where the call does not say.
+struct RigCard {
+  std::string device;              ///< "sim:", "replay:FILE", "comedi:/dev/comedi0"; empty: the call says
+  double sample_rate = kNotGiven;  ///< Hz
 };
 
 struct Rig {
@@ -56,6 +64,7 @@ struct Rig {
   RigEncoder encoder;
   RigSensors sensors;
   RigLimits limits;
+  RigCard card;
   std::vector<RigChannel> calibration;  ///< empty: the simulated rig's defaults
 };
 

@@ -7,8 +7,7 @@
 /// models/parameter_table.hpp. Names in `params.toml`: `[[joint]]` A B C D and catalogue terms; constants
 /// wheel_radius_m, initial_pressure_Pa, inertia_kg_m2; `[pcu]` K_C, T_C (or T_C_fill, T_C_vent), dead_time
 /// (label of a joint, or none: holds for all joints);
-/// `[gains]` K_P_position, K_I_position, K_P_torque, K_I_torque, and K_P, K_I, K_D of a plain PID; `[masses]`
-/// m1 m2 m3. Not identifiable values are left out, and the table's bit mask says so. Threads: pure functions
+/// `[gains]` K_P_position, K_I_position, K_P_torque, K_I_torque; `[masses]` m1 m2 m3. Not identifiable values are left out, and the table's bit mask says so. Threads: pure functions
 /// but write_tables. Throws isac::Error: bad input for a unit of the wrong dimension, too many joints and the
 /// like; "answer is no" when there is nothing to deploy. Example:
 /// `isac::record::write_tables(read_params("params.toml"), "out/isac_parameters");`
