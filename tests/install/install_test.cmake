@@ -1,0 +1,48 @@
+# Installs the build, builds a program outside the tree with find_package(isac), and runs it.
+# cmake -DBUILD_DIR=… -DSOURCE_DIR=… -DWORK_DIR=… -P install_test.cmake
+function(run)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "failed: ${ARGN}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+file(REMOVE_RECURSE ${WORK_DIR})
+run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/prefix)
+run(${CMAKE_COMMAND} -S ${SOURCE_DIR}/tests/install/consumer -B ${WORK_DIR}/build -G Ninja
+    -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix -DCMAKE_BUILD_TYPE=Release)
+run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
+
+# A pendulum-like run whose parameters are known: T = A r² φ − D φ̇ with A = -20000 N/m, D = 0.2 N m s, r = 20 mm.
+set(rows "time [s],angle [rad],p1 [kg/cm2],p2 [kg/cm2],torque [N m]\n")
+foreach(k RANGE 0 2000)
+  math(EXPR ms "${k} * 5")
+  # A triangle of 2 s: angle 0 … 1000 mrad, speed ±1 rad/s, integer arithmetic only.
+  math(EXPR phase "${ms} % 2000")
+  if(phase LESS 1000)
+    set(mrad ${phase})
+    set(sign -1)
+  else()
+    math(EXPR mrad "2000 - ${phase}")
+    set(sign 1)
+  endif()
+  # T in mN m: A r² φ = −8 N m/rad · φ, −D φ̇ = ∓0.2 N m; a small disturbance stands for the sensor's noise.
+  math(EXPR mnm "-8 * ${mrad} + ${sign} * 200 + (${k} * 7919) % 11 - 5")
+  math(EXPR s "${ms} / 1000")
+  math(EXPR rest "1000 + ${ms} % 1000")
+  string(SUBSTRING ${rest} 1 3 rest)
+  string(APPEND rows "${s}.${rest},${mrad}e-3,3,3,${mnm}e-3\n")
+endforeach()
+file(WRITE ${WORK_DIR}/run.csv "${rows}")
+file(WRITE ${WORK_DIR}/rig.toml "format = \"isac.rig/1\"\n[joint]\nchain_wheel_diameter = \"40 mm\"\n")
+run(${WORK_DIR}/build/consumer ${WORK_DIR}/rig.toml ${WORK_DIR}/run.csv)
+if(NOT output MATCHES "A -(199[0-9][0-9]|200[0-9][0-9])[. ]" AND NOT output MATCHES "A -20000 ")
+  message(FATAL_ERROR "the program outside the tree found something else: ${output}")
+endif()
+message(STATUS "${output}")
+foreach(program isac-identify isac-log)
+  if(NOT EXISTS ${WORK_DIR}/prefix/bin/${program})
+    message(FATAL_ERROR "${program} was not installed")
+  endif()
+endforeach()
