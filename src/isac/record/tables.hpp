@@ -1,16 +1,18 @@
 /// @file
 /// From `params.toml` to what a controller is given: a C header, a packed binary, and tables for people.
 ///
-/// What is deployed per joint: A, B, C, D (eq 3.10), wheel radius, p0, inertia, the validity box, the valve
-/// unit's K_C, T_C and dead time, the controller's gains, and the added effects; for the arm the masses
-/// m1…m3. Everything in SI, float64, the same bits in header and binary; the layout stands in
-/// models/parameter_table.hpp. Names in `params.toml`: `[[joint]]` A B C D and catalogue terms; constants
-/// wheel_radius_m, initial_pressure_Pa, inertia_kg_m2; `[pcu]` K_C, T_C (or T_C_fill, T_C_vent), dead_time
-/// (label of a joint, or none: holds for all joints);
-/// `[gains]` K_P_position, K_I_position, K_P_torque, K_I_torque; `[masses]` m1 m2 m3. Not identifiable values are left out, and the table's bit mask says so. Threads: pure functions
-/// but write_tables. Throws isac::Error: bad input for a unit of the wrong dimension, too many joints and the
-/// like; "answer is no" when there is nothing to deploy. Example:
-/// `isac::record::write_tables(read_params("params.toml"), "out/isac_parameters");`
+/// What is deployed per joint: A, B, C, D (eq 3.10), wheel radius, p0, inertia, the validity box, the valve unit's K_C,
+/// T_C and dead time, the controller's gains, and the added effects; for the arm the masses m1…m3. Everything in SI,
+/// float64, the same bits in header and binary; the layout stands in models/parameter_table.hpp.
+/// Names in `params.toml`:
+///  - `[[joint]]` A B C D and other catalogue terms; constants wheel_radius_m, initial_pressure_Pa, inertia_kg_m2;
+///  - `[pcu]` K_C, T_C (or T_C_fill, T_C_vent), dead_time; its label is a joint's, or none: it holds for all joints;
+///  - `[gains]` K_P_position, K_I_position, K_P_torque, K_I_torque; label as for `[pcu]`;
+///  - `[masses]` m1 m2 m3; `[[effects]]` label: the effect's id; constant `joint` (from 1), else it holds for all joints.
+/// Not identifiable values are left out, and the table's bit mask says so.
+/// Threads: pure functions but write_tables. Throws isac::Error: bad input for a unit of the wrong dimension, too many
+/// joints and the like; "answer is no" when there is nothing to deploy. Source: seed tables 6.1, 6.2; docs/formats.md.
+/// Example: `isac::record::write_tables(read_params("params.toml"), "out/isac_parameters");`
 #pragma once
 
 #include <cstddef>
