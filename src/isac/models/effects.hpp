@@ -2,47 +2,112 @@
 /// The catalogue of effects: every term that a joint's torque, its valve unit or its sensors may contain, written once.
 /// The simulator, the fit, explain, the report and the controller's feed-forward all read this place.
 ///
-/// Torque terms: T = Σ effect_torque(id, parameters, point), signs as in docs/errata.md (a dissipative term is −D φ̇).
+/// Torque terms: T = Σ effect_torque(id, parameters, point), signs as in docs/errata.md (a dissipative term is −D φ̇):
+/// effect_torque is what the effect exerts on the joint. Where the recorded output is the force that *drives* an axis,
+/// F = −Σ effect_torque, except for terms with `added_to_output`, which keep their sign; the fit of a driven axis turns
+/// the signs itself. Only effects of the muscle are in what the force sensors see, (F2 − F1) r; those of the joint and
+/// the rig act on the motion.
+/// An effect with `linear` is linear in its parameters, so a fit builds regressors by unit parameters. At
+/// `null_value` of all parameters an effect is exactly absent.
+/// Other hooks (EffectInfo::hook), in the order command → reading: effect_command, effect_pressure_rate,
+/// effect_muscle_pressure, effect_torque, effect_reading; each leaves its argument alone for effects of another hook.
 /// Units: SI inside; `ParameterInfo::si_per_unit` leads from the reporting unit to SI.
-/// Real time: no heap, no lock, noexcept, templated on the scalar (double, float, ceres::Jet).
+/// Real time: no heap, no lock, noexcept, templated on the scalar (double, float, ceres::Jet); safe from any thread.
+/// Errors: an index outside the catalogue contributes nothing (0, identity); NaN goes through.
 /// Source: docs/effects.md (ids are fixed; add, never rename).
+/// Example: `double p[] = {0.14}; effect_torque(find_effect("D"), p, JointPoint<double>{.velocity = 2.0})` is −0.28.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <string_view>
 
+#include "isac/models/effect_types.hpp"
+#include "isac/models/effects_friction.hpp"
+#include "isac/models/effects_memory.hpp"
+#include "isac/models/effects_torque.hpp"
+
 namespace isac::models {
 
-enum class Subsystem : std::uint8_t { kMuscle, kJoint, kPcu, kSensor, kRig };
+using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::MemoryEffects>::type;
 
-struct ParameterInfo {
-  const char* name;      ///< "T_c"; for a one-parameter effect the answer's key is the effect's id
-  const char* unit;      ///< reporting unit, "N m"
-  double si_per_unit;    ///< value_SI = value · si_per_unit
-  double lower, upper;   ///< plausible range in SI
-  double typical;        ///< a start value in SI
-};
+/// All effects; the position in the list is the effect's index for effect_torque() and the other hooks.
+[[nodiscard]] inline std::span<const EffectInfo> effect_catalogue() noexcept {
+  return Catalogue::kInfos;
+}
 
-inline constexpr int kMaxEffectParameters = 4;
-
-struct EffectInfo {
-  const char* id;            ///< "coulomb_friction"
-  const char* term;          ///< "Coulomb friction"
-  Subsystem where;
-  const char* equation;      ///< "-T_c sgn(w)"
-  int parameter_count;
-  ParameterInfo parameters[kMaxEffectParameters];
-  int state_count;           ///< states of its own (hysteresis, creep), 0 for memoryless terms
-  bool torque_term;          ///< enters as an added torque, so effect_torque() evaluates it
-  bool linear;               ///< the torque is linear in all its parameters
-  const char* confused_with; ///< ids, comma-separated
-  const char* told_apart_by;
-};
-
-/// All effects; the position in the list is the effect's index for effect_torque().
-[[nodiscard]] std::span<const EffectInfo> effect_catalogue() noexcept;
 /// Index in the catalogue, or −1. Knows the aliases A (stiffness), B (pressure), C (cubic_damping), D (viscous_damping).
-[[nodiscard]] int find_effect(std::string_view id_or_alias) noexcept;
+[[nodiscard]] constexpr int find_effect(std::string_view id_or_alias) noexcept {
+  constexpr const char* kAliases[][2] = {
+      {"A", "stiffness"}, {"B", "pressure"}, {"C", "cubic_damping"}, {"D", "viscous_damping"}};
+  for (const auto& alias : kAliases)
+    if (id_or_alias == alias[0]) id_or_alias = alias[1];
+  for (int i = 0; i < Catalogue::kSize; ++i)
+    if (id_or_alias == Catalogue::kInfos[i].id) return i;
+  return -1;
+}
+
+namespace detail {
+
+template <class S>
+struct TorqueCall {
+  template <class E>
+  static S call(const S* q, const JointPoint<S>& x, const S* z) noexcept {
+    if constexpr (requires { E::torque(q, x, z); }) {
+      return z == nullptr ? S(0.0) : E::torque(q, x, z);
+    } else if constexpr (requires { E::torque(q, x); }) {
+      return E::torque(q, x);
+    } else {
+      return S(0.0);
+    }
+  }
+};
+
+template <class S>
+struct DerivativeCall {
+  template <class E>
+  static void call(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    if constexpr (requires { E::derivative(q, x, z, dz); }) E::derivative(q, x, z, dz);
+  }
+};
+
+template <class S>
+struct RestCall {
+  template <class E>
+  static void call(const S* q, const JointPoint<S>& x, S* z) noexcept {
+    if constexpr (requires { E::rest(q, x, z); }) E::rest(q, x, z);
+  }
+};
+
+}  // namespace detail
+
+/// Torque of an effect on the joint, N m. `state` may be null; an effect with states is then absent.
+template <class S>
+[[nodiscard]] S effect_torque(int effect, const S* parameters, const JointPoint<S>& point,
+                              const S* state) noexcept {
+  if (!Catalogue::holds(effect)) return S(0.0);
+  return Catalogue::kTable<detail::TorqueCall<S>>[static_cast<unsigned>(effect)](parameters, point, state);
+}
+
+/// Torque of an effect without states, N m; 0 for an effect that has some.
+template <class S>
+[[nodiscard]] S effect_torque(int effect, const S* parameters, const JointPoint<S>& point) noexcept {
+  return effect_torque<S>(effect, parameters, point, nullptr);
+}
+
+/// Rates of a torque effect's states, per second; nothing is written for effects without states.
+template <class S>
+void effect_derivative(int effect, const S* parameters, const JointPoint<S>& point, const S* state,
+                       S* state_rate) noexcept {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::DerivativeCall<S>>[static_cast<unsigned>(effect)](parameters, point, state,
+                                                                              state_rate);
+}
+
+/// States of a torque effect that has long been left alone at `point`: where a simulation starts.
+template <class S>
+void effect_rest(int effect, const S* parameters, const JointPoint<S>& point, S* state) noexcept {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::RestCall<S>>[static_cast<unsigned>(effect)](parameters, point, state);
+}
 
 }  // namespace isac::models
