@@ -83,10 +83,10 @@ enum class Sweep { kSlow, kFast, kBundle, kAsked };
 
 std::string sweep_prompt(Sweep sweep, double amplitude, double speed, double duration) {
   const std::string range =
-      number("%.0f", amplitude * kDegreesPerRadian) + " degrees either side of the middle";
+      number("%.0f", amplitude * kDegreesPerRadian) + " degrees either side of where it rests";
   switch (sweep) {
     case Sweep::kBundle:
-      return "Move the bar through its whole range, " + range + ", for " + number("%.0f", duration) +
+      return "Move the bar through its range, " + range + ", for " + number("%.0f", duration) +
              " s: at every speed from very slow to as fast as you can, changing the speed every few sweeps.";
     case Sweep::kFast:
       return "Move the bar back and forth as fast as you can, " + range + ", both ways up to " +
@@ -101,7 +101,7 @@ Program constant_pressure(double level, Sweep sweep, double default_duration,
                           const ExcitationOptions& options) {
   require_delta_pressure(level, options);
   const double amplitude =
-      positive_or(options.amplitude, 0.85 * options.angle_limit, "the amplitude of the sweep");
+      positive_or(options.amplitude, 0.3 * options.angle_limit, "the amplitude of the sweep");
   require_angle(amplitude, options, "a sweep");
   double speed = std::min(kFastSpeed, options.speed_limit);
   if (sweep == Sweep::kSlow) speed = std::min(kSlowSpeed, options.speed_limit);
@@ -169,7 +169,7 @@ double largest(const std::vector<double>& levels) {
 /// Seed 3.4: clamped joint; a slow triangle in Δp, then steps.
 Program constant_angle(double angle, double default_duration, const ExcitationOptions& options) {
   require_angle(angle, options, "a clamp angle");
-  const std::vector<double> levels = step_levels(options, 0.9);
+  const std::vector<double> levels = step_levels(options, 0.45);
   const double top = largest(levels);
   const double duration = positive_or(options.duration, default_duration, "the duration");
 
@@ -298,7 +298,7 @@ Program valve_steps(const ExcitationOptions& options) {
 Program pose_holds(const ExcitationOptions& options) {
   std::vector<double> angles = options.angles;
   if (angles.empty()) {
-    for (const double share : {0.0, 0.25, 0.5, 0.75, -0.25, -0.5, -0.75})
+    for (const double share : {0.0, 0.1, 0.2, 0.3, -0.1, -0.2, -0.3})
       angles.push_back(share * options.angle_limit);
   }
   for (const double angle : angles) require_angle(angle, options, "a pose");
@@ -358,8 +358,13 @@ std::vector<Program> testbed_bundle(ExcitationOptions options) {
     programs.push_back(constant_pressure(share * room, Sweep::kFast, 20.0, options));
   }
   programs.push_back(constant_pressure(0.0, Sweep::kBundle, 300.0, options));
-  for (const double angle : {-0.5, 0.0, 0.5})
-    programs.push_back(constant_angle(angle * options.angle_limit, 40.0, options));
+  programs.push_back(constant_angle(0.0, 40.0, options));
+  options.delta_pressures = {0.125 * room, -0.125 * room, 0.25 * room,
+                             -0.25 * room};  // away from the middle: less force left
+  for (const double share : {-0.125, 0.125}) {
+    programs.push_back(constant_angle(share * options.angle_limit, 40.0, options));
+  }
+  options.delta_pressures.clear();
   programs.push_back(valve_steps(options));
   programs.push_back(free_joint(60.0, options));
   const std::size_t first_heldout = programs.size();

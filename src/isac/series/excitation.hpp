@@ -9,6 +9,9 @@
 /// so that Δp = (p2 − p1)/2 as in docs/errata.md. Programs are deterministic; phases come from `seed` and
 /// nothing else.
 ///
+/// Ranges by default are those the seed's force sensors (200 N) can show on its testbed: a hand's sweep of 0.3 of the angle
+/// limit either side of where the bar rests, and 0.45 of the Δp that limits leave room for on the clamped joint.
+///
 /// Units: SI. Real time: Program::at allocates nothing and throws nothing, O(log knots). Threads: values.
 /// Errors: make_programs throws isac::Error (usage) that names the number, the limit it breaks and the mend.
 /// Source: seed 3.2, 3.3 (slow 0.1π rad/s, fast to 2π rad/s, five-minute bundle), 3.4, 3.5 (ranges), 4.1
@@ -29,7 +32,7 @@ namespace isac::series {
 /// What the person does during a stage.
 struct Ask {
   enum class Kind { kRest, kSweepByHand, kClamp, kRelease, kPose } kind = Kind::kRest;
-  double amplitude = 0;     ///< rad, either side of the middle
+  double amplitude = 0;     ///< rad, either side of where the bar rests
   double speed = 0;         ///< rad/s, peak
   bool vary_speed = false;  ///< all speeds up to `speed`
   double angle = 0;         ///< rad, where to clamp or hold

@@ -35,8 +35,8 @@ struct SweepExpectation {
   std::string experiment;                                           ///< `# experiment:` of docs/formats.md
   double duration = std::numeric_limits<double>::quiet_NaN();       ///< s
   double sample_period = std::numeric_limits<double>::quiet_NaN();  ///< s
-  double amplitude =
-      std::numeric_limits<double>::quiet_NaN();             ///< rad, of the person's sweep about the middle
+  double amplitude = std::numeric_limits<
+      double>::quiet_NaN();  ///< rad, of the person's sweep either side of where the bar rests
   double speed = std::numeric_limits<double>::quiet_NaN();  ///< rad/s, peak asked of the person
   bool all_speeds = false;                                  ///< the bundle: every speed up to `speed`
   bool slow = false;                                        ///< quasi-static: much faster is wrong too
