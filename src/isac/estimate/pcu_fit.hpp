@@ -51,7 +51,7 @@ struct PcuFitOptions {
       true;  ///< samples that stand far out from their neighbours get no weight, and are counted
   /// Largest smooth misfit of the first-order curve, as a share of the step, that still passes as first
   /// order.
-  double first_order_tolerance = 0.10;
+  double first_order_tolerance = 0.08;
 };
 
 enum class StepDirection { kFilling, kVenting };
@@ -81,7 +81,8 @@ struct StepAdequacy {
   double misfit_rms = 0;    ///< rms of the smooth part of the residual over the step's size
   double misfit_worst = 0;  ///< largest of it
   double misfit_at = 0;     ///< s after the step at which it is largest
-  double p_value = 1;       ///< of "the residual's signs come in a random order" in the transient (runs test)
+  double p_value =
+      1;  ///< of "the misfit while moving is noise", its block means against those at rest (F test)
   StepShape best = StepShape::kFirstOrder;  ///< by rmse, with a penalty for parameters
   std::vector<StepShapeFit> shapes;         ///< all shapes tried, in the order of the enumeration
   std::string sentence;                     ///< what a lab engineer reads

@@ -1,0 +1,121 @@
+#include "isac/estimate/pcu_pool.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/estimate/step_noise.hpp"
+
+namespace isac::estimate {
+namespace {
+
+constexpr double kSignificant = 0.01;
+
+using Member = Estimated PcuStep::*;
+
+std::vector<Estimated> collect(const PcuFit& fit, Member member, const StepDirection* direction) {
+  std::vector<Estimated> out;
+  for (const PcuStep& s : fit.steps)
+    if (!direction || s.direction == *direction) out.push_back(s.*member);
+  return out;
+}
+
+}  // namespace
+
+Estimated pool(const std::vector<Estimated>& values, const std::string& name, bool& heterogeneous) {
+  heterogeneous = false;
+  std::vector<const Estimated*> good;
+  for (const Estimated& v : values)
+    if (v.identifiable && v.std_error > 0) good.push_back(&v);
+  if (good.empty()) {
+    Estimated none;
+    none.name = name;
+    none.identifiable = false;
+    none.reason = values.empty() ? "no step in this direction was recorded" : values.front().reason;
+    return none;
+  }
+  Estimated out = *good.front();
+  out.name = name;
+  if (good.size() == 1) return out;
+
+  double w = 0, ww = 0, wx = 0;
+  for (const Estimated* v : good) {
+    const double weight = 1 / (v->std_error * v->std_error);
+    w += weight;
+    ww += weight * weight;
+    wx += weight * v->value;
+  }
+  const double mean = wx / w, k = static_cast<double>(good.size());
+  double q = 0, least_half = 1e300;
+  for (const Estimated* v : good) {
+    q += std::pow((v->value - mean) / v->std_error, 2);
+    least_half = std::min(least_half, 0.5 * (v->ci_high - v->ci_low) / v->std_error);
+  }
+  heterogeneous = chi_square_tail(q, k - 1) < kSignificant;
+  if (!heterogeneous) {
+    out.value = mean;
+    out.std_error = 1 / std::sqrt(w);
+    // The quantile of the surest step: pooling only adds degrees of freedom.
+    const double half = std::clamp(least_half, 1.96, 12.71) * out.std_error;
+    out.ci_low = mean - half;
+    out.ci_high = mean + half;
+    return out;
+  }
+  const double between = std::max(0.0, (q - (k - 1)) / (w - ww / w));
+  double v = 0, vx = 0;
+  for (const Estimated* e : good) {
+    const double weight = 1 / (e->std_error * e->std_error + between);
+    v += weight;
+    vx += weight * e->value;
+  }
+  out.value = vx / v;
+  out.std_error = 1 / std::sqrt(v);
+  const double half = student_95(k - 1) * out.std_error;
+  out.ci_low = out.value - half;
+  out.ci_high = out.value + half;
+  return out;
+}
+
+void pool_steps(PcuFit& fit) {
+  const StepDirection fill = StepDirection::kFilling, vent = StepDirection::kVenting;
+  const struct {
+    const char* name;
+    const char* unit;
+    Member member;
+    const StepDirection* direction;
+  } wanted[] = {
+      {"K_C", "-", &PcuStep::gain, nullptr},
+      {"T_C", "s", &PcuStep::lag, nullptr},
+      {"dead_time", "s", &PcuStep::dead_time, nullptr},
+      {"K_fill", "-", &PcuStep::gain, &fill},
+      {"T_fill", "s", &PcuStep::lag, &fill},
+      {"dead_time_fill", "s", &PcuStep::dead_time, &fill},
+      {"K_vent", "-", &PcuStep::gain, &vent},
+      {"T_vent", "s", &PcuStep::lag, &vent},
+      {"dead_time_vent", "s", &PcuStep::dead_time, &vent},
+  };
+  for (const auto& want : wanted) {
+    bool differ = false;
+    Estimated value = pool(collect(fit, want.member, want.direction), want.name, differ);
+    value.unit = want.unit;
+    if (differ && want.direction)
+      fit.warnings.push_back(
+          {"steps_differ", fmt::format("{} differs from step to step by more than its errors: it depends on "
+                                       "the size or level of the step",
+                                       want.name)});
+    fit.parameters.push_back(std::move(value));
+  }
+  const Estimated *a = fit.find("T_fill"), *b = fit.find("T_vent");
+  if (a->identifiable && b->identifiable) {
+    const double apart = std::abs(a->value - b->value);
+    fit.directions_differ = apart > 2.58 * std::hypot(a->std_error, b->std_error);
+    if (fit.directions_differ)
+      fit.warnings.push_back(
+          {"directions_differ", fmt::format("filling takes {:.3g} s, venting {:.3g} s: use T_fill and T_vent "
+                                            "instead of the one T_C",
+                                            a->value, b->value)});
+  }
+}
+
+}  // namespace isac::estimate
