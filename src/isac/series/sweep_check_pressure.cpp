@@ -83,7 +83,7 @@ void check_steps(Sweep& sweep) {
   if (command_2 && !sweep.p2.empty()) count_steps(command_2->values, sweep.p2, sweep.time, count);
   if (count.steps == 0) {
     sweep.remark("no_steps",
-                 "no step of the pressure command was held long enough to be seen; repeat it with a longer "
+                 "0 steps of the pressure command were held for 20 samples or more; repeat it with a longer "
                  "--duration or --hold");
     return;
   }
