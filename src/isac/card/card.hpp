@@ -79,7 +79,7 @@ struct Task {
     kRelease,       ///< clamp or hand let go: the joint is free
     kPose,          ///< led to `angle_rad` and held by hand
     kRemoveLoad,    ///< force sensors off the rig, lying flat, nothing acting on them
-    kHangWeight,    ///< `load_newton` hung on each force sensor, one after the other
+    kHangWeight,    ///< `load_newton` hung on both force sensors
     kConnectSupply  ///< pressure sensors connected to the supply, its regulator at `pressure_pascal` (seed
                     ///< E.3.2)
   } kind = Kind::kRest;
