@@ -27,8 +27,8 @@ void write_atomically(const std::filesystem::path& path, std::string_view bytes,
 
 struct LogColumn {
   std::string name;
-  std::string unit;    ///< unit written in the header; values are given in this unit
-  int decimals = -1;   ///< digits behind the point, -1 for the shortest exact form
+  std::string unit;   ///< unit written in the header; values are given in this unit
+  int decimals = -1;  ///< digits behind the point, -1 for the shortest exact form
 };
 
 class AppendLog {
