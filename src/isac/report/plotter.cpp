@@ -1,0 +1,459 @@
+#include "isac/report/plotter.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gnuplot-iostream.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "isac/core/error.hpp"
+#include "isac/report/text.hpp"
+
+extern char** environ;
+
+namespace isac::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kFont = 12;    // pixels
+constexpr double kGlyph = 6.6;  // mean width of a glyph of that font
+constexpr double kLeft = 68;    // margins around a plot, pixels
+constexpr double kRight = 14;
+constexpr double kBottom = 44;
+constexpr double kBottomUnlabelled = 12;
+constexpr double kTop = 10;
+constexpr double kRow = 19;        // one row of title or legend
+constexpr double kKeySample = 34;  // legend sample and its gaps
+
+/// A folder of its own under the temporary directory, gone when the scope is left.
+class TemporaryFolder {
+ public:
+  TemporaryFolder() {
+    std::string pattern = (fs::temp_directory_path() / "isac-report-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr)
+      throw Error(ErrorKind::kStopped, "temporary_folder",
+                  "cannot make a temporary folder for the figures; free some space or set TMPDIR to a "
+                  "writable folder");
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] const fs::path& path() const noexcept { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+fs::path find_gnuplot() {
+  const char* variable = std::getenv("PATH");
+  std::istringstream folders(variable == nullptr ? "" : variable);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    const fs::path candidate = fs::path(folder.empty() ? "." : folder) / "gnuplot";
+    std::error_code ignored;
+    if (fs::is_regular_file(candidate, ignored) && access(candidate.c_str(), X_OK) == 0) return candidate;
+  }
+  throw Error(ErrorKind::kStopped, "gnuplot_missing",
+              "the report needs gnuplot, and none is on the PATH; install it with `apt-get install "
+              "gnuplot-nox`, or call "
+              "without --report");
+}
+
+std::string read_all(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  std::ostringstream out;
+  out << in.rdbuf();
+  return out.str();
+}
+
+/// Runs `gnuplot -d script`, its words into `log`; true when it ended well.
+bool run(const fs::path& program, const fs::path& script, const fs::path& log) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 1, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, 2, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  std::string name = "gnuplot";
+  std::string option = "-d";  // no ~/.gnuplot: the same picture on every machine
+  std::string file = script.string();
+  char* const arguments[] = {name.data(), option.data(), file.data(), nullptr};
+  pid_t child = 0;
+  const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, arguments, environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed != 0) return false;
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0) {
+    if (errno != EINTR) return false;
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+std::string quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : clean_utf8(text)) {
+    out += c;
+    if (c == '\'') out += c;
+  }
+  return out + "'";
+}
+
+/// A step of 1, 2 or 5 times a power of ten that gives at most `most` ticks.
+double tick_step(double span, double most) {
+  const double raw = span / std::max(1.0, most);
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * power >= raw * (1 - 1e-9)) return factor * power;
+  return 10 * power;
+}
+
+std::string tick_format(double step, Range range) {
+  const double largest = std::max(std::abs(range.low), std::abs(range.high));
+  if (largest >= 1e6 || largest < 1e-3) return "%.3g";
+  const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+  return fmt::format("%.{}f", decimals);
+}
+
+struct Placed {  // of one panel, pixels from the top left of the picture
+  double left = 0, top = 0, width = 0, height = 0;
+  double head = 0;       // rows of title and legend above the plot
+  bool key_row = false;  // the legend has rows of its own
+  double key_rows = 0;
+  bool x_labelled = true;
+};
+
+double legend_width(const Panel& panel) {
+  double width = 0;
+  for (const Curve& curve : panel.curves)
+    if (!curve.label.empty()) width += static_cast<double>(glyphs(curve.label)) * kGlyph + kKeySample;
+  return width;
+}
+
+std::size_t legend_entries(const Panel& panel) {
+  return static_cast<std::size_t>(std::count_if(panel.curves.begin(), panel.curves.end(),
+                                                [](const Curve& curve) { return !curve.label.empty(); }));
+}
+
+struct Layout {
+  std::vector<Placed> panels;
+  double width = 0, height = 0;
+};
+
+Layout lay_out(const Figure& figure) {
+  const auto columns = static_cast<std::size_t>(std::max(1, figure.columns));
+  const double cell = figure.width / static_cast<double>(columns);
+  Layout out{.panels = std::vector<Placed>(figure.panels.size()), .width = figure.width};
+  double y = 0;
+  for (std::size_t first = 0; first < figure.panels.size(); first += columns) {
+    const std::size_t last = std::min(first + columns, figure.panels.size());
+    double head = 0;
+    double height = 0;
+    const bool lowest = first + columns >= figure.panels.size();
+    for (std::size_t k = first; k < last; ++k) {
+      const Panel& panel = figure.panels[k];
+      Placed& placed = out.panels[k];
+      placed.left = cell * static_cast<double>(k - first) + kLeft;
+      placed.width = cell - kLeft - kRight;
+      const double title =
+          panel.title.empty() ? 0 : static_cast<double>(glyphs(panel.title) + 6) * kGlyph * 1.1;
+      const double key = legend_width(panel);
+      placed.key_row = key > 0 && title > 0 && title + key > placed.width;
+      double widest = 0;
+      for (const Curve& curve : panel.curves)
+        if (!curve.label.empty())
+          widest = std::max(widest, static_cast<double>(glyphs(curve.label)) * kGlyph + kKeySample);
+      const double per_row = std::max(1.0, std::floor(placed.width / std::max(1.0, widest)));
+      const bool one_row = key <= placed.width - (placed.key_row ? 0 : title);
+      placed.key_rows =
+          key <= 0 ? 0 : (one_row ? 1 : std::ceil(static_cast<double>(legend_entries(panel)) / per_row));
+      placed.head = kRow * ((title > 0 && (key <= 0 || placed.key_row) ? 1 : 0) + placed.key_rows);
+      placed.x_labelled = lowest || !figure.shared_x;
+      head = std::max(head, placed.head);
+      height = std::max(height, panel.height > 0 ? panel.height : figure.panel_height);
+    }
+    for (std::size_t k = first; k < last; ++k) {
+      out.panels[k].top = y + kTop + head;
+      out.panels[k].height = height;
+    }
+    y += kTop + head + height + (lowest || !figure.shared_x ? kBottom : kBottomUnlabelled);
+  }
+  out.height = y;
+  return out;
+}
+
+Range axis_range(const Axis& axis, Range data) {
+  Range out = data;
+  if (!axis.tight && !axis.log) out = padded(data, 0.05);
+  if (axis.log) out = {std::max(data.low, 1e-300) / 1.3, data.high * 1.3};
+  if (std::isfinite(axis.low)) out.low = axis.low;
+  if (std::isfinite(axis.high)) out.high = axis.high;
+  if (!(out.low < out.high)) out.high = out.low + 1;
+  return out;
+}
+
+std::string axis_text(const Axis& axis) {
+  const std::string unit = pretty_unit(axis.unit);
+  return unit.empty() ? axis.label : axis.label + " (" + unit + ")";
+}
+
+std::string dash_type(Dash dash) {
+  if (dash == Dash::kDashed) return "dt (8,5)";
+  if (dash == Dash::kDotted) return "dt (2,4)";
+  return "dt 1";
+}
+
+std::string stroke(const Curve& curve) {
+  return fmt::format("lc rgb '{}' lw {:.2f} {}", curve.colour, curve.size, dash_type(curve.dash));
+}
+
+std::string key_entry(const Curve& curve) {
+  std::string style;
+  switch (curve.mark) {
+    case Mark::kLine:
+    case Mark::kSteps:
+      style = "lines " + stroke(curve);
+      break;
+    case Mark::kRuns:
+    case Mark::kPoints:
+      style = fmt::format("points pt 7 ps {:.2f} lc rgb '{}'", 0.55, curve.colour);
+      break;
+    case Mark::kErrorBars:
+      style = fmt::format("points pt 7 ps 0.55 lc rgb '{}'", curve.colour);
+      break;
+    case Mark::kBand:
+      style = fmt::format("lines lc rgb '{}' lw 7", "#c9d8e6");
+      break;
+    case Mark::kBars:
+      style = fmt::format("lines lc rgb '{}' lw 7", curve.colour);
+      break;
+  }
+  return "keyentry with " + style + " title " + quoted(curve.label);
+}
+
+std::string plot_clause(const Curve& curve) {
+  switch (curve.mark) {
+    case Mark::kLine:
+      return "'-' using 1:2 with lines " + stroke(curve) + " notitle";
+    case Mark::kSteps:
+      return "'-' using 1:2 with steps " + stroke(curve) + " notitle";
+    case Mark::kPoints:
+    case Mark::kRuns:
+      return "'-' using 1:2 with lines " + stroke(curve) + " notitle";
+    case Mark::kErrorBars:
+      return fmt::format("'-' using 1:2:3:4 with yerrorbars pt 7 ps 0.45 lc rgb '{}' lw 1 notitle",
+                         curve.colour);
+    case Mark::kBand:
+      return fmt::format("'-' using 1:2:3 with filledcurves fs solid noborder lc rgb '{}' notitle",
+                         "#c9d8e6");
+    case Mark::kBars:
+      return fmt::format("'-' using 1:2 with boxes fs solid 0.85 border lc rgb '{}' notitle", curve.colour);
+  }
+  return {};
+}
+
+void send_strokes(Gnuplot& gnuplot, const std::vector<double>& left, const std::vector<double>& right,
+                  const std::vector<double>& y, double least) {
+  gnuplot << std::defaultfloat << std::setprecision(9);
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    if (!std::isfinite(left[i]) || !std::isfinite(y[i])) continue;
+    gnuplot << left[i] << ' ' << y[i] << '\n' << std::max(right[i], left[i] + least) << ' ' << y[i] << "\n\n";
+  }
+  gnuplot << "e\n";
+}
+
+void send_data(Gnuplot& gnuplot, const Curve& curve, Range x_range) {
+  switch (curve.mark) {
+    case Mark::kLine:
+    case Mark::kSteps:
+    case Mark::kBars:
+      gnuplot.send1d(std::make_tuple(curve.x, curve.y));
+      return;
+    case Mark::kErrorBars:
+      gnuplot.send1d(std::make_tuple(curve.x, curve.y, curve.low, curve.high));
+      return;
+    case Mark::kBand:
+      gnuplot.send1d(std::make_tuple(curve.x, curve.low, curve.high));
+      return;
+    // A dot is a stroke too short to be seen as one, with round ends: a tenth of the bytes of gnuplot's symbols.
+    case Mark::kPoints:
+      send_strokes(gnuplot, curve.x, curve.x, curve.y, 3e-5 * x_range.span());
+      return;
+    case Mark::kRuns:
+      send_strokes(gnuplot, curve.low, curve.high, curve.y, 3e-5 * x_range.span());
+      return;
+  }
+}
+
+void send_ticks(Gnuplot& gnuplot, char axis, const Axis& description, Range range, double pixels,
+                double per_tick, bool labelled) {
+  if (description.log) {
+    gnuplot << "set logscale " << axis << "\nset " << axis << "tics autofreq\nset format " << axis
+            << " '%g'\n";
+    return;
+  }
+  gnuplot << "unset logscale " << axis << "\n";
+  const double step = tick_step(range.span(), std::max(2.0, std::floor(pixels / per_tick)));
+  gnuplot << fmt::format("set {}tics {:.12g}\n", axis, step);
+  gnuplot << fmt::format("set format {} '{}'\n", axis, labelled ? tick_format(step, range) : "");
+}
+
+void send_decorations(Gnuplot& gnuplot, const Panel& panel, const Placed& placed, const Layout& layout,
+                      const std::string& letter) {
+  gnuplot << "unset label\nunset arrow\nunset object\n";
+  const auto screen_y = [&](double pixels) { return 1 - pixels / layout.height; };
+  if (!panel.title.empty()) {
+    const double rows = placed.key_row ? placed.key_rows : 0;
+    gnuplot << fmt::format(
+        "set label {} at screen {:.6f},{:.6f} left front tc rgb '#222222' font 'Arial Bold,{}'\n",
+        quoted(letter + panel.title), placed.left / layout.width, screen_y(placed.top - 9 - kRow * rows),
+        kFont);
+  }
+  for (std::size_t i = 0; i < panel.notes.size(); ++i) {
+    gnuplot << fmt::format(
+        "set label {} at screen {:.6f},{:.6f} left front tc rgb '#222222' font 'Arial,{}'\n",
+        quoted(panel.notes[i]), (placed.left + 8) / layout.width,
+        screen_y(placed.top + 13 + 16 * static_cast<double>(i)), kFont - 1);
+  }
+  for (const ReferenceLine& mark : panel.lines) {
+    if (mark.vertical) {
+      gnuplot << fmt::format("set arrow from first {0:.12g}, graph 0 to first {0:.12g}, graph 1", mark.at);
+    } else {
+      gnuplot << fmt::format("set arrow from graph 0, first {0:.12g} to graph 1, first {0:.12g}", mark.at);
+    }
+    gnuplot << " nohead front lc rgb '" << colour::kReference << "' lw 1 dt (5,4)\n";
+    if (mark.label.empty()) continue;
+    const std::string at =
+        mark.vertical ? fmt::format("first {:.12g}, graph 0.96 left offset character 0.4,0", mark.at)
+                      : fmt::format("graph 0.995, first {:.12g} right offset character 0,0.5", mark.at);
+    gnuplot << fmt::format("set label {} at {} front tc rgb '#555555' font 'Arial,{}'\n", quoted(mark.label),
+                           at, kFont - 1);
+  }
+  for (const Box& box : panel.boxes) {
+    gnuplot << fmt::format(
+        "set object rectangle from first {:.12g}, first {:.12g} to first {:.12g}, first {:.12g} front fs "
+        "empty border rgb "
+        "'{}' lw 1.6\n",
+        box.x_low, box.y_low, box.x_high, box.y_high, box.colour);
+  }
+}
+
+void send_panel(Gnuplot& gnuplot, const Panel& panel, const Placed& placed, const Layout& layout,
+                const std::string& letter) {
+  Range data_x = data_range_x(panel);
+  Range data_y = data_range_y(panel);
+  for (const Box& box : panel.boxes) {
+    data_x = united(data_x, {box.x_low, box.x_high});
+    data_y = united(data_y, {box.y_low, box.y_high});
+  }
+  const Range x = axis_range(panel.x, data_x);
+  Range y = axis_range(panel.y, data_y);
+  if (!panel.notes.empty() && !std::isfinite(panel.y.high))  // room for the notes above the data
+    y.high += y.span() * 17 * static_cast<double>(panel.notes.size()) / placed.height;
+  gnuplot << fmt::format("set lmargin at screen {:.6f}\nset rmargin at screen {:.6f}\n",
+                         placed.left / layout.width, (placed.left + placed.width) / layout.width);
+  gnuplot << fmt::format("set tmargin at screen {:.6f}\nset bmargin at screen {:.6f}\n",
+                         1 - placed.top / layout.height, 1 - (placed.top + placed.height) / layout.height);
+  gnuplot << fmt::format("set xrange [{:.12g}:{:.12g}]\nset yrange [{:.12g}:{:.12g}]\n", x.low, x.high, y.low,
+                         y.high);
+  send_ticks(gnuplot, 'x', panel.x, x, placed.width, 64, placed.x_labelled);
+  send_ticks(gnuplot, 'y', panel.y, y, placed.height, 34, true);
+  gnuplot << "set xlabel " << quoted(placed.x_labelled ? axis_text(panel.x) : "") << " offset 0,0.2\n";
+  gnuplot << fmt::format("set ylabel '' \n");
+  send_decorations(gnuplot, panel, placed, layout, letter);
+  gnuplot << fmt::format("set label {} at screen {:.6f},{:.6f} center rotate by 90 front font 'Arial,{}'\n",
+                         quoted(axis_text(panel.y)), (placed.left - kLeft + 15) / layout.width,
+                         1 - (placed.top + 0.5 * placed.height) / layout.height, kFont);
+  if (placed.key_rows > 0) {
+    gnuplot << fmt::format(
+        "set key at screen {:.6f},{:.6f} right bottom horizontal Left reverse samplen 1.6 spacing "
+        "1.1 maxrows {:.0f} font 'Arial,{}'\n",
+        (placed.left + placed.width) / layout.width, 1 - (placed.top - 4) / layout.height, placed.key_rows,
+        kFont);
+  } else {
+    gnuplot << "unset key\n";
+  }
+  gnuplot << "plot ";
+  const char* separator = "";
+  for (const Curve& curve : panel.curves) {
+    gnuplot << separator << plot_clause(curve);
+    separator = ", ";
+  }
+  for (const Curve& curve : panel.curves)
+    if (!curve.label.empty()) gnuplot << separator << key_entry(curve);
+  gnuplot << "\n";
+  for (const Curve& curve : panel.curves) send_data(gnuplot, curve, x);
+}
+
+void send_figure(Gnuplot& gnuplot, const Figure& figure, const fs::path& file) {
+  const Layout layout = lay_out(figure);
+  gnuplot << fmt::format(
+      "set terminal svg size {:.0f},{:.0f} dynamic noenhanced rounded font 'Arial,{}' name 'p'\n",
+      layout.width, layout.height, kFont);
+  gnuplot << "set encoding utf8\nset minussign\nset output " << quoted(file.string()) << "\n";
+  gnuplot << "set datafile missing 'nan'\nset border 3 lw 0.9 lc rgb '#555555'\nset tics out nomirror scale "
+             "0.5 tc rgb "
+             "'#222222'\nset mxtics 1\nset mytics 1\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
+             "1\nset bars "
+             "0.5\nset boxwidth 0.95 relative\n";
+  gnuplot << "set multiplot\n";
+  const std::size_t titled = static_cast<std::size_t>(std::count_if(
+      figure.panels.begin(), figure.panels.end(), [](const Panel& panel) { return !panel.title.empty(); }));
+  for (std::size_t k = 0; k < figure.panels.size(); ++k) {
+    const bool lettered = titled > 1 && k < 26;
+    send_panel(gnuplot, figure.panels[k], layout.panels[k], layout,
+               lettered ? fmt::format("({}) ", static_cast<char>('a' + k)) : "");
+  }
+  gnuplot << "unset multiplot\nset output\nreset\n";
+}
+
+}  // namespace
+
+void require_gnuplot() {
+  static_cast<void>(find_gnuplot());
+}
+
+std::vector<std::string> render_svg(std::span<const Figure> figures) {
+  if (figures.empty()) return {};
+  const fs::path program = find_gnuplot();
+  for (const Figure& figure : figures) {
+    if (is_empty(figure))
+      throw Error(ErrorKind::kUsage, "figure_empty",
+                  "figure \"" + figure.id + "\" has a panel without a point to draw");
+  }
+  const TemporaryFolder folder;
+  const fs::path script = folder.path() / "figures.gp";
+  const auto svg_file = [&](std::size_t k) { return folder.path() / fmt::format("{}.svg", k); };
+  {
+    Gnuplot gnuplot(
+        ">" + script.string());  // a file, not a pipe: gnuplot's exit status is seen, no signal is raised
+    for (std::size_t k = 0; k < figures.size(); ++k) send_figure(gnuplot, figures[k], svg_file(k));
+  }
+  const fs::path log = folder.path() / "log";
+  if (!run(program, script, log)) {
+    std::string words = clean_utf8(read_all(log));
+    if (words.size() > 400) words.resize(400);
+    throw Error(ErrorKind::kStopped, "gnuplot_failed",
+                "gnuplot could not draw the report's figures (" + program.string() + "): " + words);
+  }
+  std::vector<std::string> out;
+  for (std::size_t k = 0; k < figures.size(); ++k)
+    out.push_back(embeddable_svg(read_all(svg_file(k)), figures[k].id, figures[k].alt));
+  return out;
+}
+
+}  // namespace isac::report
