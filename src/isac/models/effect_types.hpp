@@ -80,7 +80,7 @@ struct JointPoint {
 /// The valve unit of one pair; index 0 is muscle 1, index 1 muscle 2.
 template <class S>
 struct ValvePoint {
-  S command[2]{};   ///< Pa, as given
+  S command[2]{};   ///< Pa, as the effects before left it
   S pressure[2]{};  ///< Pa, the state of the first-order lag
   S velocity{};     ///< rad/s of the joint
   S lag{};          ///< s, T_C of the baseline

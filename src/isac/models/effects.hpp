@@ -9,8 +9,7 @@
 /// the rig act on the motion.
 /// An effect with `linear` is linear in its parameters, so a fit builds regressors by unit parameters. At
 /// `null_value` of all parameters an effect is exactly absent.
-/// Other hooks (EffectInfo::hook), in the order command → reading: effect_command, effect_pressure_rate,
-/// effect_muscle_pressure, effect_torque, effect_reading; each leaves its argument alone for effects of another hook.
+/// The other hooks (EffectInfo::hook), from the valve's command to the sensor's reading, stand in effect_hooks.hpp.
 /// Units: SI inside; `ParameterInfo::si_per_unit` leads from the reporting unit to SI.
 /// Real time: no heap, no lock, noexcept, templated on the scalar (double, float, ceres::Jet); safe from any thread.
 /// Errors: an index outside the catalogue contributes nothing (0, identity); NaN goes through.
@@ -24,11 +23,14 @@
 #include "isac/models/effect_types.hpp"
 #include "isac/models/effects_friction.hpp"
 #include "isac/models/effects_memory.hpp"
+#include "isac/models/effects_pcu.hpp"
+#include "isac/models/effects_sensor.hpp"
 #include "isac/models/effects_torque.hpp"
 
 namespace isac::models {
 
-using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::MemoryEffects>::type;
+using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::MemoryEffects,
+                       effect::PcuEffects, effect::SensorEffects>::type;
 
 /// All effects; the position in the list is the effect's index for effect_torque() and the other hooks.
 [[nodiscard]] inline std::span<const EffectInfo> effect_catalogue() noexcept {

@@ -43,6 +43,7 @@ struct Hysteresis {
 };
 
 /// The Dahl loop with its own height and length in either direction; the height changes where z = 0, without a jump.
+/// Not passive in general: with unequal lengths a small to and fro ratchets against the load (docs/derivations/effects.md).
 struct AsymmetricHysteresis {
   static constexpr EffectInfo kInfo{.id = "asymmetric_hysteresis",
                                     .term = "hysteresis that differs by direction",
@@ -57,8 +58,7 @@ struct AsymmetricHysteresis {
                                     .torque_term = true,
                                     .linear = false,
                                     .confused_with = "hysteresis, asymmetric_fill_vent",
-                                    .told_apart_by = "survives at 0.01 Hz",
-                                    .dissipative = true};
+                                    .told_apart_by = "survives at 0.01 Hz"};
   template <class S>
   static S torque(const S* q, const JointPoint<S>&, const S* z) noexcept {
     return -((z[0] > S(0.0) ? q[0] : q[1]) * z[0]);
