@@ -140,16 +140,13 @@ class Console : public runtime::SessionObserver {
 
   void prompt(const std::string& sentence) override {
     erase();
-    fmt::print(out_, "  {}\n", sentence);
+    fmt::print(out_, "{}\n", runtime::wrapped("  " + sentence, columns(), 2));
     std::fflush(out_);
   }
 
   void progress(const series::Program& program, const runtime::Live& live) override {
     if (terminal_) {
-      winsize window{};
-      const bool known = ::ioctl(::fileno(out_), TIOCGWINSZ, &window) == 0 && window.ws_col > 0;
-      const int columns = known ? window.ws_col : 80;
-      fmt::print(out_, "\r\033[K  {}", runtime::progress_line(program, live, columns - 3));
+      fmt::print(out_, "\r\033[K  {}", runtime::progress_line(program, live, columns() - 3));
       std::fflush(out_);
       drawn_ = true;
       return;
@@ -164,7 +161,7 @@ class Console : public runtime::SessionObserver {
 
   void judged(const runtime::RecordingOutcome& outcome) override {
     erase();
-    fmt::print(out_, "  {}", runtime::verdict_lines(outcome, terminal_));
+    fmt::print(out_, "{}", runtime::verdict_lines(outcome, terminal_, columns()));
     std::fflush(out_);
   }
 
@@ -174,6 +171,13 @@ class Console : public runtime::SessionObserver {
     std::fflush(out_);
   }
 
+  /// Of the terminal; 0 for a file or a pipe.
+  [[nodiscard]] int columns() const {
+    if (!terminal_) return 0;
+    winsize window{};
+    const bool known = ::ioctl(::fileno(out_), TIOCGWINSZ, &window) == 0 && window.ws_col > 0;
+    return known ? window.ws_col : 80;
+  }
   [[nodiscard]] const char* bold() const { return terminal_ ? "\033[1m" : ""; }
   [[nodiscard]] const char* plain() const { return terminal_ ? "\033[0m" : ""; }
 

@@ -255,6 +255,13 @@ INSTANTIATE_TEST_SUITE_P(
                 for (double& force : values(c.recording, "F1")) force += 50.0;
               },
               "force_saturated"},
+        Fault{"force_in_valve_steps", valve_steps,
+              [](Case& c) {
+                c.expected.force_capacity = 90.0, c.expected.ranges[1].high = 300.0;
+                values(c.recording, "F2").assign(7000, 80.0);
+                values(c.recording, "F2")[0] = 79.0;
+              },
+              "force_saturated", false},
         Fault{"slack", fast_sweep,
               [](Case& c) {
                 for (double& force : values(c.recording, "F1")) force = std::max(force - 60.0, -10.0);
@@ -334,7 +341,7 @@ INSTANTIATE_TEST_SUITE_P(
         Fault{"did_not_move", free_joint, [](Case& c) { c.expected.moved_by_muscles = 2.0; },
               "joint_did_not_move"},
         Fault{"pose_missing", poses, [](Case& c) { c.expected.poses.push_back(-0.3); }, "pose_missing"}),
-    [](const testing::TestParamInfo<Fault>& info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<Fault>& fault) { return std::string(fault.param.name); });
 
 TEST(SweepCheck, says_so_when_there_is_next_to_nothing) {
   Case made = slow_sweep();

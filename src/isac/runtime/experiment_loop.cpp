@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kRampSeconds = 1.5;    // vented to initial pressure: eight lags of the valve unit
 constexpr double kSettleSeconds = 1.0;  // six lags
+constexpr double kLetGoSeconds = 0.5;   // four periods of the testbed's joint (T_J 0.032 s, damping 0.26)
 constexpr double kPatienceSeconds = 60.0;
 
 card::Task to_task(const series::Ask& ask) noexcept {
@@ -107,9 +108,13 @@ bool ExperimentLoop::write(const series::Pressures& pressures, LogRow* row) noex
 
 void ExperimentLoop::ask(std::size_t stage) noexcept {
   live_.stage.store(static_cast<int>(stage), std::memory_order_release);
+  ask_person(program_.stages[stage].ask);
+}
+
+void ExperimentLoop::ask_person(const series::Ask& ask) noexcept {
   if (!rig_.person) return;
   try {
-    rig_.person->ask(to_task(program_.stages[stage].ask));
+    rig_.person->ask(to_task(ask));
   } catch (...) {  // a simulated person that runs out of memory: treated as one who does not come
     result_.end = LoopResult::End::kPersonLate;
   }
@@ -209,7 +214,17 @@ LoopResult ExperimentLoop::record(LogWriter& writer) noexcept {
     live_.rows.store(result_.rows, std::memory_order_relaxed);
   }
   live_.recording.store(false, std::memory_order_release);
+  let_go();
   return result_;
+}
+
+// A bar that is let go while the muscles still hold it comes to rest; one that is let go when they are vented falls.
+void ExperimentLoop::let_go() noexcept {
+  const series::Ask::Kind kind = program_.stages.front().ask.kind;
+  const bool in_hand = kind == series::Ask::Kind::kSweepByHand || kind == series::Ask::Kind::kPose;
+  if (!rig_.person || !in_hand || !options_.lead_in || result_.end != LoopResult::End::kDone) return;
+  ask_person({});
+  hold(kLetGoSeconds);
 }
 
 }  // namespace isac::runtime

@@ -78,7 +78,9 @@ class ExperimentLoop {
   bool ramp_pressures() noexcept;
   bool wait_until_ready() noexcept;
   bool hold(double seconds) noexcept;
-  void ask(std::size_t stage) noexcept;
+  void ask(std::size_t stage) noexcept;  ///< and shows its prompt
+  void ask_person(const series::Ask& ask) noexcept;
+  void let_go() noexcept;
   void wait_for_wall_clock() const noexcept;
   bool end(LoopResult::End why) noexcept;
 

@@ -9,7 +9,6 @@
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <set>
 #include <thread>
 
 #include "isac/core/error.hpp"
@@ -57,10 +56,8 @@ void make_folder(const fs::path& folder) {
 /// Everything about the output that can be refused before a valve opens; leaves folders, no files.
 void prepare_output(const SessionOptions& options) {
   double bytes = 1e6;  // the rig file, metadata, and a margin
-  std::set<fs::path> folders = {options.folder};
   for (const series::Program& program : options.programs) {
     const fs::path file = file_of(options, program);
-    folders.insert(file.parent_path());
     if (fs::exists(file) && !options.overwrite) {
       refuse_output(
           "file_exists",
@@ -84,7 +81,7 @@ void prepare_output(const SessionOptions& options) {
             static_cast<double>(space.available) / 1e6, bytes / 1e6),
         options.folder);
   }
-  for (const fs::path& folder : folders) make_folder(folder);
+  make_folder(options.folder);
   if (!options.dataset || options.rig_file.empty()) return;
   const fs::path copy = options.folder / "rig.toml";
   if (fs::exists(copy) && fs::equivalent(copy, options.rig_file, error)) return;
@@ -210,6 +207,7 @@ class Session {
     RecordingOutcome outcome;
     outcome.file = file_of(options_, program);
     outcome.program = program.name;
+    make_folder(outcome.file.parent_path());
     Live live;
     Work work;
     std::thread loop([&] {
@@ -264,7 +262,9 @@ class Session {
             : fmt::format("; the valves are vented and the {} samples until then are in {}",
                           outcome.loop.rows, outcome.file.string());
     const auto stopped = [&](const char* code, const std::string& why) {
-      throw Error(ErrorKind::kStopped, code, "stopped during " + outcome.program + ": " + why + kept);
+      throw Error(ErrorKind::kStopped, code,
+                  "stopped " + std::string(outcome.loop.rows == 0 ? "while getting ready for " : "during ") +
+                      outcome.program + ": " + why + kept);
     };
     switch (outcome.loop.end) {
       case LoopResult::End::kDone:

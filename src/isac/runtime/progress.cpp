@@ -30,20 +30,46 @@ std::string progress_line(const series::Program& program, const Live& live, int 
          std::string(static_cast<std::size_t>(cells - full), '-') + "]  " + facts;
 }
 
-std::string verdict_lines(const RecordingOutcome& outcome, bool colour) {
+std::string wrapped(const std::string& text, int columns, int indent) {
+  if (columns <= indent + 20) return text;
+  std::string out;
+  int used = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    std::size_t end = text.find(' ', begin);
+    end = end == std::string::npos ? text.size() : end;
+    const int word = static_cast<int>(end - begin);
+    if (used > indent && used + 1 + word > columns) {
+      out += "\n" + std::string(static_cast<std::size_t>(indent), ' ');
+      used = indent;
+    } else if (begin > 0) {
+      out += ' ';
+      ++used;
+    }
+    out.append(text, begin, end - begin);
+    used += word;
+    begin = end + 1;
+  }
+  return out;
+}
+
+std::string verdict_lines(const RecordingOutcome& outcome, bool colour, int columns) {
   const bool keep = outcome.verdict.keep();
   const series::SweepFacts& facts = outcome.verdict.facts;
   const char* on = !colour ? "" : keep ? "\033[1;32m" : "\033[1;31m";
   const char* off = colour ? "\033[0m" : "";
-  std::string text = fmt::format(
-      "{}{:<6}{}  {}: {} samples, angle {:+.2f} to {:+.2f} rad, speed {:+.2f} to {:+.2f} rad/s, "
-      "dp {:+.2f} to {:+.2f} kg/cm2, F {:.0f} to {:.0f} N\n",
-      on, keep ? "keep" : "repeat", off, outcome.file.filename().string(), facts.rows, facts.angle_low,
-      facts.angle_high, -facts.speed_backward, facts.speed_forward,
+  const std::string covered = fmt::format(
+      "          {} samples, angle {:+.2f} to {:+.2f} rad, speed {:+.2f} to {:+.2f} rad/s, dp {:+.2f} to "
+      "{:+.2f} kg/cm2, "
+      "F {:.0f} to {:.0f} N",
+      facts.rows, facts.angle_low, facts.angle_high, -facts.speed_backward, facts.speed_forward,
       facts.delta_pressure_low / kPascalPerKgfCm2, facts.delta_pressure_high / kPascalPerKgfCm2,
       facts.force_low, facts.force_high);
+  std::string text = fmt::format("  {}{:<6}{}  {}\n{}\n", on, keep ? "keep" : "repeat", off,
+                                 outcome.file.filename().string(), wrapped(covered, columns, 10));
   for (const series::SweepRemark& remark : outcome.verdict.remarks) {
-    text += fmt::format("        - {}{}\n", remark.repeat ? "" : "note: ", remark.text);
+    text +=
+        wrapped(fmt::format("          - {}{}", remark.repeat ? "" : "note: ", remark.text), columns, 12) +
+        "\n";
   }
   return text;
 }

@@ -14,8 +14,11 @@ namespace isac::runtime {
 /// One line, no longer than `columns` (0: no bar).
 [[nodiscard]] std::string progress_line(const series::Program& program, const Live& live, int columns);
 
-/// "keep    file.csv  20000 samples, angle …" and a line "- …" for each remark.
-[[nodiscard]] std::string verdict_lines(const RecordingOutcome& outcome, bool colour);
+/// `text` broken at spaces so that no line is longer than `columns` (0: not broken); lines after the first are indented.
+[[nodiscard]] std::string wrapped(const std::string& text, int columns, int indent);
+
+/// "keep    file.csv", what it covers, and a line "- …" for each remark.
+[[nodiscard]] std::string verdict_lines(const RecordingOutcome& outcome, bool colour, int columns);
 
 /// The last line of a session.
 [[nodiscard]] std::string summary_line(const std::vector<RecordingOutcome>& outcomes, std::size_t asked);

@@ -250,8 +250,8 @@ Program free_joint(double default_duration, const ExcitationOptions& options) {
 Program valve_steps(const ExcitationOptions& options) {
   std::vector<double> heights = options.heights;
   if (heights.empty()) {
-    const double top = 0.9 * options.pressure_limit, base = options.base_pressure;
-    for (const double share : {0.3, 0.6, 0.85, 1.0}) heights.push_back(base + share * (top - base));
+    const double top = 0.8 * options.pressure_limit, base = options.base_pressure;
+    for (const double share : {1.0 / 3.0, 2.0 / 3.0, 1.0}) heights.push_back(base + share * (top - base));
   }
   for (const double height : heights) {
     if (std::isfinite(height) && height >= 0.0 && height <= options.pressure_limit &&

@@ -147,6 +147,7 @@ void check_present(Sweep& sweep) {
 
 void check_saturation(Sweep& sweep) {
   constexpr int kTolerated = 2;  // a lone spike is the fit's business (robust loss), not a saturated sensor
+  const bool valve_run = sweep.expected.experiment == "pcu-step";  // looks at pressures only
   for (const char* name : {"F1", "F2", "p1", "p2"}) {
     const Column* column = sweep.recording.find(name);
     if (!column) continue;
@@ -166,16 +167,24 @@ void check_saturation(Sweep& sweep) {
       if (column->values[i] <= low && bottom++ == 0) first_bottom = sweep.time[i];
     }
     const auto shown = [&](double value) { return force ? number("%.1f", value) + " N" : in_kgf(value); };
+    const std::string whose(name);
     if (top > kTolerated) {
-      sweep.remark(force ? "force_saturated" : "pressure_saturated",
-                   std::string(name) + " stood at the top of its range (" + shown(high) + ") in " +
-                       std::to_string(top) + " samples, first at " + number("%.2f", first_top) + " s; " +
-                       (force ? "move less far or use a smaller pressure difference, and repeat"
-                              : "use lower pressures, and repeat"));
+      const std::string found = whose + " stood at the top of its range (" + shown(high) + ") in " +
+                                std::to_string(top) + " samples, first at " + number("%.2f", first_top) +
+                                " s; ";
+      if (!force) {
+        sweep.remark("pressure_saturated", found + "use lower pressures, and repeat");
+      } else if (valve_run) {
+        sweep.remark("force_saturated",
+                     found + "the valve steps do not need it, but lower --heights spare the sensor", false);
+      } else {
+        sweep.remark("force_saturated",
+                     found + "move less far or use a smaller pressure difference, and repeat");
+      }
     }
-    if (bottom > kTolerated && force) {
+    if (bottom > kTolerated && force && !valve_run) {
       sweep.remark("muscle_slack",
-                   std::string(name) + " stood at the bottom of its range (" + shown(low) + ") in " +
+                   whose + " stood at the bottom of its range (" + shown(low) + ") in " +
                        std::to_string(bottom) + " samples, first at " + number("%.2f", first_bottom) +
                        " s: the muscle went slack or the sensor lost its zero; move less far, or mount "
                        "the muscles with more pre-tension, and repeat");
