@@ -51,18 +51,32 @@ struct DifferentiatorChoice {
   int order = 3;   ///< of its polynomial
 };
 
+/// What the model is to hold for (seed 3.2, 3.5): terms whose input never comes near it are refused, and how well a
+/// parameter must be known is judged by the torque it makes there. Not used for driven and linear axes.
+struct OperatingRange {
+  double angle = 1.1780972450961724;      ///< rad, 3/8 π
+  double speed = 6.283185307179586;       ///< rad/s, the fast sweeps of the seed
+  double delta_pressure = 2.0 * 98066.5;  ///< Pa
+};
+
 struct JointFitOptions {
   /// Catalogue ids (models/effects.hpp) or the aliases A, B, C, D of the seed's model.
   std::vector<std::string> terms = {"A", "B", "C", "D"};
-  std::string output_unit = "N m";   ///< for messages and the JSON
-  std::string position_unit = "rad"; ///< "m" for a linear axis
-  double wheel_radius = 0.019;       ///< m
+  std::string output_unit = "N m";            ///< for messages and the JSON
+  std::string position_unit = "rad";          ///< "m" for a linear axis
+  double wheel_radius = 0.019;                ///< m
   double reference_pressure = 3.0 * 98066.5;  ///< Pa, p0 of pressure-dependent terms
   Loss loss;
   NoiseLevels noise;
   DifferentiatorChoice differentiator;
-  double block_seconds = std::numeric_limits<double>::quiet_NaN();  ///< NaN: from the residual's correlation time
+  double block_seconds =
+      std::numeric_limits<double>::quiet_NaN();  ///< NaN: from the residual's correlation time
+  /// False: the regressors are taken as exact: no bias correction, no weights from their noise, no parallel filter.
   bool errors_in_variables = true;
+  bool effective_variance = true;  ///< weights 1/(σ_T² + noise of the regressors through the model)
+  bool parallel_filter =
+      true;  ///< output and all regressors pass the differentiator's low-pass (memoryless linear terms)
+  OperatingRange operating;
 };
 
 /// A check of the fitted model, with the sentence a lab engineer reads.
@@ -86,7 +100,8 @@ struct RunResidual {
   std::string name;
   bool heldout = false;
   double rmse = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> time, angle, velocity, delta_pressure, measured, predicted;  ///< usable rows only, for pictures
+  std::vector<double> time, angle, velocity, delta_pressure, measured,
+      predicted;  ///< usable rows only, for pictures
 };
 
 struct JointFit {
@@ -97,7 +112,8 @@ struct JointFit {
   double rmse = std::numeric_limits<double>::quiet_NaN();
   double nrmse = std::numeric_limits<double>::quiet_NaN();
   double heldout_rmse = std::numeric_limits<double>::quiet_NaN();
-  double noise_floor = std::numeric_limits<double>::quiet_NaN();  ///< standard deviation of the output's white noise
+  double noise_floor =
+      std::numeric_limits<double>::quiet_NaN();  ///< standard deviation of the output's white noise
   std::size_t samples = 0;
   std::size_t outliers = 0;  ///< rows whose weight the robust loss cut below one half
   std::size_t blocks = 0;

@@ -1,0 +1,361 @@
+#include "isac/estimate/joint_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/series/differentiate.hpp"
+#include "isac/series/statistics.hpp"
+
+namespace isac::estimate {
+namespace {
+
+using series::Segment;
+
+double norm(const std::vector<double>& weights) {
+  double sum = 0;
+  for (const double w : weights) sum += w * w;
+  return std::sqrt(sum);
+}
+
+/// a ∗ b: the kernel of one filter behind the other.
+std::vector<double> chain(const std::vector<double>& a, const std::vector<double>& b) {
+  std::vector<double> out(a.size() + b.size() - 1, 0.0);
+  for (std::size_t i = 0; i < a.size(); ++i)
+    for (std::size_t j = 0; j < b.size(); ++j) out[i + j] += a[i] * b[j];
+  return out;
+}
+
+RowNoise noise_of(const RowRecipe& recipe, double interval, bool velocity_measured, double velocity_noise) {
+  const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
+  const std::vector<double> low_pass =
+      recipe.parallel_filter ? series::implied_low_pass(polynomial) : std::vector<double>{1.0};
+  const std::vector<double> first = series::kernel(polynomial, 1, interval),
+                            second = series::kernel(polynomial, 2, interval);
+  RowNoise noise;
+  const auto set = [&](Input input, double sigma, const std::vector<double>& weights) {
+    noise.raw[static_cast<int>(input)] = sigma * norm(weights);
+    noise.filtered[static_cast<int>(input)] = sigma * norm(chain(weights, low_pass));
+  };
+  const std::vector<double> plain{1.0};
+  set(Input::kAngle, recipe.angle_noise, plain);
+  if (velocity_measured) {
+    set(Input::kVelocity, velocity_noise, plain);
+    set(Input::kAcceleration, velocity_noise, first);
+  } else {
+    set(Input::kVelocity, recipe.angle_noise, first);
+    set(Input::kAcceleration, recipe.angle_noise, second);
+  }
+  set(Input::kDeltaPressure, recipe.delta_pressure_noise, plain);
+  set(Input::kMeanPressure, recipe.delta_pressure_noise, plain);
+  return noise;
+}
+
+/// Columns of one run over all its samples, NaN where not known.
+struct RunColumns {
+  std::vector<double> input[kInputs];
+  std::vector<std::vector<double>> x;
+  std::vector<double> y;
+  std::vector<Segment> segments;
+  double interval = 0;
+  RowNoise noise;
+};
+
+/// A regressor that is a constant times one input; input −1: it is not.
+struct Proportional {
+  int input = -1;
+  double factor = 0;
+};
+
+Proportional proportional(const JointTerms& terms, std::size_t k) {
+  int read = -1;
+  for (int z = 0; z < kInputs; ++z) {
+    if (!terms.reads(k, static_cast<Input>(z))) continue;
+    if (read >= 0) return {};
+    read = z;
+  }
+  if (read < 0 || terms.regressor(k, {}) != 0.0) return {};
+  const auto at = [&](double value) {
+    JointState state;
+    set_value(state, static_cast<Input>(read), value);
+    return terms.regressor(k, state);
+  };
+  const double factor = at(1.0);
+  for (const double value : {-3.7, 0.013, 1.9e5})
+    if (std::abs(at(value) - factor * value) > 1e-12 * std::abs(factor * value)) return {};
+  return {read, factor};
+}
+
+/// Hampel's identifier over seven samples; returns how many were replaced.
+std::size_t remove_spikes(std::vector<double>& y) {
+  constexpr std::size_t kHalf = 3;
+  if (y.size() < 2 * kHalf + 1) return 0;
+  std::vector<double> middle(y.size(), std::nan("")), off(y.size(), std::nan(""));
+  for (std::size_t i = kHalf; i + kHalf < y.size(); ++i) {
+    double near[2 * kHalf + 1];
+    for (std::size_t j = 0; j <= 2 * kHalf; ++j) near[j] = y[i + j - kHalf];
+    if (std::any_of(std::begin(near), std::end(near), [](double v) { return !std::isfinite(v); })) continue;
+    std::nth_element(near, near + kHalf, near + 2 * kHalf + 1);
+    middle[i] = near[kHalf];
+    off[i] = y[i] - middle[i];
+  }
+  const double limit = 6.0 * series::robust_deviation(off, true);
+  if (!(limit > 0)) return 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < y.size(); ++i)
+    if (std::abs(off[i]) > limit) {
+      y[i] = middle[i];
+      ++count;
+    }
+  return count;
+}
+
+RunColumns columns_of(const JointRun& run, const JointTerms& terms, const RowRecipe& recipe) {
+  RunColumns out;
+  const std::size_t rows = run.time.size();
+  const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
+  const bool measured = !run.velocity.empty();
+  const bool acceleration = terms.reads(Input::kAcceleration);
+  series::Derivatives d = series::differentiate(
+      run.time, measured ? run.velocity : run.angle, polynomial,
+      {.value = false, .first = !measured || acceleration, .second = !measured && acceleration});
+  out.segments = d.segments;
+  out.interval = d.interval;
+  double velocity_noise = 0;
+  if (measured && recipe.unbiased_cube)
+    velocity_noise = series::choose_window(run.time, run.velocity, recipe.order).noise;
+  out.noise = noise_of(recipe, d.interval, measured, std::isfinite(velocity_noise) ? velocity_noise : 0.0);
+  out.input[0] = run.angle;
+  out.input[1] = measured ? run.velocity : std::move(d.first);
+  out.input[2] = !acceleration ? std::vector<double>(rows, 0.0)
+                 : measured    ? std::move(d.first)
+                               : std::move(d.second);
+  out.input[3] = run.delta_pressure.empty() ? std::vector<double>(rows, 0.0) : run.delta_pressure;
+  out.input[4] = run.mean_pressure.empty() ? std::vector<double>(rows, 0.0) : run.mean_pressure;
+  out.y = run.output;
+  const double sigma_v = recipe.unbiased_cube ? out.noise.raw[static_cast<int>(Input::kVelocity)] : 0.0;
+  out.x.assign(terms.linear().size(), {});
+  const double origin = rows > 0 ? run.time.front() : 0.0;
+  for (std::size_t k = 0; k < out.x.size(); ++k) {
+    auto& x = out.x[k];
+    x.resize(rows);
+    const bool cube = terms.is_cubic_damping(k);
+    if (const Proportional p = proportional(terms, k);
+        p.input >= 0) {  // A, B, D, inertia: no need to ask row by row
+      const std::vector<double>& z = out.input[p.input];
+      for (std::size_t i = 0; i < rows; ++i) x[i] = p.factor * z[i];
+      continue;
+    }
+    if (cube) {
+      // E[v̂³] = v³ + 3σ²v: the Hermite polynomial is unbiased.
+      const double factor = terms.regressor(k, {.velocity = 1.0});
+      const std::vector<double>& v = out.input[static_cast<int>(Input::kVelocity)];
+      for (std::size_t i = 0; i < rows; ++i) x[i] = factor * (v[i] * v[i] - 3.0 * sigma_v * sigma_v) * v[i];
+      continue;
+    }
+    for (std::size_t i = 0; i < rows; ++i) {
+      const JointState state{out.input[0][i], out.input[1][i], out.input[2][i],
+                             out.input[3][i], out.input[4][i], run.time[i] - origin};
+      x[i] = terms.regressor(k, state);
+      if (!std::isfinite(state.velocity)) x[i] = std::nan("");
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+JointState JointRows::state(std::size_t i) const {
+  return {input[0][i], input[1][i], input[2][i], input[3][i], input[4][i], time[i]};
+}
+
+JointRows make_rows(std::span<const JointRun> runs, const JointTerms& terms, const RowRecipe& recipe) {
+  JointRows out;
+  const std::size_t terms_count = terms.linear().size();
+  out.plain.resize(terms_count);
+  if (recipe.parallel_filter) out.filtered.resize(terms_count);
+  const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
+  const std::vector<double> low_pass = series::implied_low_pass(polynomial);
+  for (const JointRun& run : runs) {
+    const std::size_t rows = run.time.size();
+    out.seen += rows;
+    RunColumns columns = columns_of(run, terms, recipe);
+    std::vector<double> cleaned;
+    if (recipe.parallel_filter) {
+      cleaned = columns.y;
+      if (recipe.clean_spikes) out.cleaned += remove_spikes(cleaned);
+    }
+    std::vector<std::vector<double>> filtered;
+    std::vector<double> filtered_output;
+    if (recipe.parallel_filter) {
+      for (std::size_t k = 0; k < terms_count; ++k)
+        filtered.push_back(series::convolve(columns.x[k], low_pass, columns.segments));
+      filtered_output = series::convolve(cleaned, low_pass, columns.segments);
+    }
+    RunRows span{.name = run.name,
+                 .begin = out.size(),
+                 .end = 0,
+                 .interval = columns.interval,
+                 .noise = columns.noise};
+    const double origin = rows > 0 ? run.time.front() : 0.0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      bool usable = std::isfinite(columns.y[i]) && std::isfinite(columns.input[1][i]) &&
+                    std::isfinite(columns.input[0][i]);
+      for (std::size_t k = 0; k < terms_count && usable; ++k) usable = std::isfinite(columns.x[k][i]);
+      if (recipe.parallel_filter && usable) {
+        usable = std::isfinite(filtered_output[i]);
+        for (std::size_t k = 0; k < terms_count && usable; ++k) usable = std::isfinite(filtered[k][i]);
+      }
+      if (!terms.nonlinear().empty())
+        for (int z = 0; z < kInputs && usable; ++z) usable = std::isfinite(columns.input[z][i]);
+      if (!usable) continue;
+      out.time.push_back(run.time[i] - origin);
+      for (int z = 0; z < kInputs; ++z) out.input[z].push_back(columns.input[z][i]);
+      out.output.push_back(columns.y[i]);
+      for (std::size_t k = 0; k < terms_count; ++k) out.plain[k].push_back(columns.x[k][i]);
+      if (recipe.parallel_filter) {
+        for (std::size_t k = 0; k < terms_count; ++k) out.filtered[k].push_back(filtered[k][i]);
+        out.filtered_output.push_back(filtered_output[i]);
+      }
+    }
+    span.end = out.size();
+    out.runs.push_back(std::move(span));
+  }
+  return out;
+}
+
+namespace {
+
+/// How the k-th regressor follows one standard deviation of an input, at a state.
+double slope(const JointTerms& terms, std::size_t k, const JointState& state, Input input, double sigma) {
+  if (sigma == 0.0) return 0.0;
+  JointState up = state, down = state;
+  set_value(up, input, value_of(state, input) + sigma);
+  set_value(down, input, value_of(state, input) - sigma);
+  return 0.5 * (terms.regressor(k, up) - terms.regressor(k, down));
+}
+
+/// Does x_k change by the same amount everywhere (A, B, D, inertia)? Then one evaluation serves all rows.
+bool constant_slope(const JointTerms& terms, std::size_t k, Input input) {
+  const JointState a{
+      .angle = 0.3, .velocity = 0.7, .acceleration = 0.9, .delta_pressure = 4e4, .mean_pressure = 2e5};
+  const JointState b{
+      .angle = -0.8, .velocity = -2.1, .acceleration = -1.3, .delta_pressure = -9e4, .mean_pressure = 3e5};
+  const double h = input == Input::kDeltaPressure || input == Input::kMeanPressure ? 1e3 : 1e-2;
+  const double first = slope(terms, k, a, input, h), second = slope(terms, k, b, input, h);
+  return std::abs(first - second) <= 1e-9 * std::abs(first);
+}
+
+struct Sensitivity {
+  std::size_t k;
+  Input input;
+  bool constant;
+};
+
+std::vector<Sensitivity> sensitivities(const JointTerms& terms) {
+  std::vector<Sensitivity> out;
+  for (std::size_t k = 0; k < terms.linear().size(); ++k)
+    for (int z = 0; z < kInputs; ++z)
+      if (terms.reads(k, static_cast<Input>(z)))
+        out.push_back({k, static_cast<Input>(z), constant_slope(terms, k, static_cast<Input>(z))});
+  return out;
+}
+
+double sensitivity_at(const JointTerms& terms, const Sensitivity& s, const JointState& state, double sigma) {
+  if (terms.is_cubic_damping(s.k)) {
+    const double v = state.velocity;
+    const double sign = terms.regressor(s.k, {.velocity = 1.0}) > 0 ? 1.0 : -1.0;
+    return sign * 3.0 * sigma * (v * v - sigma * sigma);
+  }
+  return slope(terms, s.k, state, s.input, sigma);
+}
+
+}  // namespace
+
+Eigen::MatrixXd noise_gram(const JointRows& rows, const JointTerms& terms, const double* omega,
+                           std::size_t begin, std::size_t end) {
+  const auto n = static_cast<Eigen::Index>(terms.linear().size());
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n, n);
+  const std::vector<Sensitivity> all = sensitivities(terms);
+  const bool filtered = !rows.filtered.empty();
+  std::vector<double> d(all.size());
+  for (const RunRows& run : rows.runs) {
+    const std::size_t first = std::max(begin, run.begin), last = std::min(end, run.end);
+    if (first >= last) continue;
+    const double* sigma = filtered ? run.noise.filtered : run.noise.raw;
+    double weight = 0;
+    bool varying = false;
+    for (std::size_t i = first; i < last; ++i) weight += omega != nullptr ? omega[i] : 1.0;
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      if (all[a].constant) d[a] = sensitivity_at(terms, all[a], {}, sigma[static_cast<int>(all[a].input)]);
+      varying = varying || !all[a].constant;
+    }
+    for (std::size_t a = 0; a < all.size(); ++a)
+      for (std::size_t b = 0; b < all.size(); ++b)
+        if (all[a].constant && all[b].constant && all[a].input == all[b].input)
+          out(static_cast<Eigen::Index>(all[a].k), static_cast<Eigen::Index>(all[b].k)) +=
+              weight * d[a] * d[b];
+    if (!varying) continue;
+    for (std::size_t i = first; i < last; ++i) {
+      const double w = omega != nullptr ? omega[i] : 1.0;
+      const JointState state = rows.state(i);
+      for (std::size_t a = 0; a < all.size(); ++a)
+        if (!all[a].constant)
+          d[a] = sensitivity_at(terms, all[a], state, sigma[static_cast<int>(all[a].input)]);
+      for (std::size_t a = 0; a < all.size(); ++a)
+        for (std::size_t b = 0; b < all.size(); ++b) {
+          if (all[a].input != all[b].input || (all[a].constant && all[b].constant)) continue;
+          out(static_cast<Eigen::Index>(all[a].k), static_cast<Eigen::Index>(all[b].k)) += w * d[a] * d[b];
+        }
+      for (std::size_t a = 0; a < all.size(); ++a) {
+        if (!terms.is_cubic_damping(all[a].k)) continue;
+        // Var(v̂³ − 3σ²v̂) has the unbiased estimate 9σ²v̂⁴ − 36σ⁴v̂² + 15σ⁶; the square of d lacks −18σ⁴v̂² + 6σ⁶.
+        const double v2 = state.velocity * state.velocity, s = sigma[static_cast<int>(Input::kVelocity)],
+                     s2 = s * s;
+        const auto k = static_cast<Eigen::Index>(all[a].k);
+        out(k, k) += w * (-18.0 * s2 * s2 * v2 + 6.0 * s2 * s2 * s2);
+      }
+    }
+  }
+  return out;
+}
+
+std::vector<double> prediction_variance(const JointRows& rows, const JointTerms& terms,
+                                        const Eigen::VectorXd& theta) {
+  std::vector<double> out(rows.size(), 0.0);
+  const bool filtered = !rows.filtered.empty();
+  std::vector<Sensitivity> all = sensitivities(terms);
+  for (const RunRows& run : rows.runs) {
+    const double* sigma = filtered ? run.noise.filtered : run.noise.raw;
+    double base[kInputs] = {};
+    for (const Sensitivity& s : all)
+      if (s.constant)
+        base[static_cast<int>(s.input)] += theta[static_cast<Eigen::Index>(s.k)] *
+                                           sensitivity_at(terms, s, {}, sigma[static_cast<int>(s.input)]);
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      double part[kInputs];
+      std::copy(std::begin(base), std::end(base), std::begin(part));
+      const JointState state = rows.state(i);
+      for (const Sensitivity& s : all)
+        if (!s.constant)
+          part[static_cast<int>(s.input)] +=
+              theta[static_cast<Eigen::Index>(s.k)] *
+              sensitivity_at(terms, s, state, sigma[static_cast<int>(s.input)]);
+      for (const double p : part) out[i] += p * p;
+    }
+  }
+  return out;
+}
+
+std::vector<double> predict(const JointRows& rows, const JointTerms& terms, const Eigen::VectorXd& theta) {
+  std::vector<double> out(rows.size(), 0.0);
+  const std::size_t linear = terms.linear().size();
+  for (std::size_t k = 0; k < linear; ++k)
+    for (std::size_t i = 0; i < out.size(); ++i)
+      out[i] += theta[static_cast<Eigen::Index>(k)] * rows.plain[k][i];
+  if (!terms.nonlinear().empty())
+    for (std::size_t i = 0; i < out.size(); ++i)
+      out[i] += terms.nonlinear_value(rows.state(i), theta.data() + linear, nullptr);
+  return out;
+}
+
+}  // namespace isac::estimate

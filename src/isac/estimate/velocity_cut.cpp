@@ -1,0 +1,137 @@
+#include "isac/estimate/velocity_cut.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "isac/series/statistics.hpp"
+
+namespace isac::estimate {
+namespace {
+
+struct Passage {
+  double velocity, torque;
+};
+
+/// Passages through the middle at nearly constant speed.
+std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& offset, double half_width) {
+  std::vector<Passage> out;
+  const std::vector<double>& angle = rows.input[static_cast<int>(Input::kAngle)];
+  const std::vector<double>& velocity = rows.input[static_cast<int>(Input::kVelocity)];
+  std::vector<double> torque;
+  for (const RunRows& run : rows.runs) {
+    for (std::size_t i = run.begin; i < run.end; ++i) {
+      if (std::abs(angle[i]) > half_width) continue;
+      std::size_t end = i;
+      double low = velocity[i], high = velocity[i], sum = 0;
+      torque.clear();
+      while (end < run.end && std::abs(angle[end]) <= half_width &&
+             (end == i || rows.time[end] - rows.time[end - 1] <= 2.5 * run.interval)) {
+        low = std::min(low, velocity[end]);
+        high = std::max(high, velocity[end]);
+        sum += velocity[end];
+        torque.push_back(offset[end]);
+        ++end;
+      }
+      const double mean = sum / static_cast<double>(end - i);
+      const bool steady = high - low <= 0.2 * std::abs(mean);
+      const bool through = end > i + 2 && (angle[end - 1] - angle[i]) * mean > 0 &&
+                           std::abs(angle[end - 1] - angle[i]) > half_width;
+      if (steady && through) out.push_back({mean, series::median(torque)});
+      i = end;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+VelocityCut velocity_cut(const JointRows& rows, const JointTerms& terms, const Eigen::VectorXd& theta) {
+  VelocityCut cut;
+  cut.C.name = "C";
+  cut.C.unit = "N m s3";
+  cut.D.name = "D";
+  cut.D.unit = "N m s";
+  Eigen::VectorXd others = theta;
+  for (std::size_t k = 0; k < terms.linear().size(); ++k)
+    if (terms.is_cubic_damping(k) || terms.is_viscous_damping(k)) others[static_cast<Eigen::Index>(k)] = 0.0;
+  std::vector<double> offset = predict(rows, terms, others);
+  for (std::size_t i = 0; i < offset.size(); ++i) offset[i] = rows.output[i] - offset[i];
+  double reach = 0;
+  if (rows.size() > 0) {
+    std::vector<double> size = rows.input[static_cast<int>(Input::kAngle)];
+    for (double& v : size) v = std::abs(v);
+    reach = series::quantile(size, 0.99);
+  }
+  const std::vector<Passage> points = passages(rows, offset, 0.1 * reach);
+  const auto refuse = [&](const std::string& reason) {
+    for (Estimated* e : {&cut.C, &cut.D}) {
+      e->identifiable = false;
+      e->reason = reason;
+    }
+  };
+  if (points.size() < 8) {
+    refuse(
+        fmt::format("only {} passages through the middle at constant speed; record a bundle: five minutes by "
+                    "hand, all positions, "
+                    "speeds up to 6.28 rad/s",
+                    points.size()));
+    return cut;
+  }
+  double fastest = 0;
+  for (const Passage& point : points) fastest = std::max(fastest, std::abs(point.velocity));
+  constexpr int kBins = 24;
+  for (int bin = 0; bin < kBins; ++bin) {
+    const double low = fastest * (2.0 * bin / kBins - 1.0), high = fastest * (2.0 * (bin + 1) / kBins - 1.0);
+    double sum = 0, square = 0, count = 0;
+    for (const Passage& point : points)
+      if (point.velocity >= low && (point.velocity < high || (bin == kBins - 1 && point.velocity <= high))) {
+        sum += point.torque;
+        square += point.torque * point.torque;
+        ++count;
+      }
+    if (count < 3) continue;
+    const double mean = sum / count;
+    cut.velocity.push_back(0.5 * (low + high));
+    cut.torque_offset.push_back(mean);
+    cut.std_error.push_back(std::sqrt(std::max(0.0, square / count - mean * mean) / (count - 1.0)));
+  }
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Eigen::MatrixXd x(n, 2);
+  Eigen::VectorXd y(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double v = points[static_cast<std::size_t>(i)].velocity;
+    x(i, 0) = -v * v * v;
+    x(i, 1) = -v;
+    y[i] = points[static_cast<std::size_t>(i)].torque;
+  }
+  const Eigen::Vector2d scale = x.colwise().norm().cwiseInverse();
+  x = x * scale.asDiagonal();
+  const Eigen::Matrix2d inverse = (x.transpose() * x).inverse();
+  if (!inverse.allFinite() || inverse.diagonal().maxCoeff() > 1e6) {
+    refuse("all passages have the same speed; record passages from slow to 6.28 rad/s");
+    return cut;
+  }
+  const Eigen::Vector2d fit = inverse * (x.transpose() * y);
+  Eigen::Matrix2d meat = Eigen::Matrix2d::Zero();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector2d row = x.row(i);
+    const double leverage = std::min(0.99, row.dot(inverse * row));
+    const double residual = (y[i] - row.dot(fit)) / (1.0 - leverage);
+    meat += residual * residual * row * row.transpose();
+  }
+  const Eigen::Matrix2d covariance = inverse * meat * inverse;
+  const double limit = series::student_t_limit(0.95, static_cast<double>(n) - 2.0);
+  Estimated* estimates[2] = {&cut.C, &cut.D};
+  for (int k = 0; k < 2; ++k) {
+    estimates[k]->value = fit[k] * scale[k];
+    estimates[k]->std_error = std::sqrt(covariance(k, k)) * scale[k];
+    estimates[k]->ci_low = estimates[k]->value - limit * estimates[k]->std_error;
+    estimates[k]->ci_high = estimates[k]->value + limit * estimates[k]->std_error;
+  }
+  return cut;
+}
+
+}  // namespace isac::estimate
