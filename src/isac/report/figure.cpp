@@ -134,11 +134,22 @@ Curve band(std::string label, std::string colour, std::span<const double> x, std
 
 std::vector<Curve> scatter(std::span<const double> x, std::span<const double> y, double width,
                            double height) {
+  return scatter(x, y, range_of(x), range_of(y), width, height);
+}
+
+std::string lower_first(std::string text) {
+  if (!text.empty() && text.front() >= 'A' && text.front() <= 'Z')
+    text.front() = static_cast<char>(text.front() + 32);
+  return text;
+}
+
+std::vector<Curve> scatter(std::span<const double> x, std::span<const double> y, Range range_x, Range range_y,
+                           double width, double height) {
   if (x.size() <= kManyPoints) return {dots("", colour::kSecond, x, y, kManyPoints, 2.6)};
   const auto columns = static_cast<std::size_t>(std::max(8.0, width / kCellPixels));
   const auto rows = static_cast<std::size_t>(std::max(8.0, height / kCellPixels));
   std::vector<Curve> out;
-  auto levels = density(x, y, range_of(x), range_of(y), columns, rows, kShades.size());
+  auto levels = density(x, y, range_x, range_y, columns, rows, kShades.size());
   for (std::size_t k = 0; k < levels.size(); ++k) {
     Curve shade{.mark = Mark::kRuns,
                 .colour = kShades[k],

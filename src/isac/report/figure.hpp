@@ -111,9 +111,15 @@ inline constexpr std::size_t kPixelColumns = 680;  ///< plot width of a one-colu
                                std::span<const double> y, std::span<const double> half_width);
 [[nodiscard]] Curve band(std::string label, std::string colour, std::span<const double> x,
                          std::span<const double> low, std::span<const double> high);
-/// Few points: dots. Many: shades of blue by count, in a plot of about `width` × `height` pixels.
+/// Few points: dots. Many: shades of blue by count, in a plot of about `width` × `height` pixels that shows the given
+/// ranges (rows outside are not counted).
+[[nodiscard]] std::vector<Curve> scatter(std::span<const double> x, std::span<const double> y, Range range_x,
+                                         Range range_y, double width, double height);
+/// The same over the data's own ranges.
 [[nodiscard]] std::vector<Curve> scatter(std::span<const double> x, std::span<const double> y, double width,
                                          double height);
+/// "Torque T" → "torque T", for the middle of a sentence.
+[[nodiscard]] std::string lower_first(std::string text);
 
 /// The least x-range and y-range that show all curves of a panel.
 [[nodiscard]] Range data_range_x(const Panel& panel);

@@ -58,7 +58,7 @@ Panel scatter_panel(const JointView& view, const Pooled& rows, const std::string
   const Range shown = padded(both, 0.04);
   panel.x.low = panel.y.low = shown.low;
   panel.x.high = panel.y.high = shown.high;
-  panel.curves = scatter(rows.predicted, rows.measured, 298, 298);
+  panel.curves = scatter(rows.predicted, rows.measured, shown, shown, 298, 298);
   const std::vector<double> ends = {shown.low, shown.high};
   Curve identity = line("", "#222222", ends, ends);
   identity.dash = Dash::kDashed;
@@ -75,7 +75,7 @@ Panel residual_panel(const JointView& view, const Axis& axis, const std::vector<
   Panel panel{.x = axis, .y = view.residual, .lines = {{.at = 0, .label = {}}}};
   panel.y.low = -reach;
   panel.y.high = reach;
-  panel.curves = scatter(x, residual, 170, 180);
+  panel.curves = scatter(x, residual, range_of(x), {-reach, reach}, 170, 180);
   const BinnedMean mean = binned_mean(x, residual, 18, 20);
   std::vector<double> half = mean.std_error;
   for (double& h : half) h *= 2;
@@ -113,9 +113,9 @@ Figure torque_sensor_figure(const JointView& view) {
                 .shared_x = true};
   Panel both{.x = view.time, .y = view.output};
   Curve measured = line("measured", colour::kMeasured, part(rows.time, window), part(rows.measured, window));
-  measured.size = 2.2;
+  measured.size = 2.6;
   Curve model = line("model", colour::kModel, part(rows.time, window), part(rows.predicted, window));
-  model.size = 1.2;
+  model.size = 1.1;
   both.curves = {std::move(measured), std::move(model)};
   Panel difference{.x = view.time, .y = view.residual, .lines = {{.at = 0, .label = {}}}, .height = 90};
   const std::vector<double> e = residuals(rows);
@@ -161,7 +161,7 @@ MaybeFigure static_figure(const JointView& view) {
       .panel_height = 210};
   Panel panel{.x = view.time, .y = view.output};
   Curve measured = line("measured", colour::kMeasured, part(rows.time, window), part(rows.measured, window));
-  measured.size = 2.2;
+  measured.size = 2.6;
   Curve plain = line("static model", colour::kSecond, part(rows.time, window), part(still, window));
   plain.dash = Dash::kDashed;
   Curve full = line("full model", colour::kModel, part(rows.time, window), part(rows.predicted, window));

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -12,6 +11,7 @@ namespace {
 
 constexpr double kSlowShare = 0.3;  // a run is slow below this share of the fastest run's speed
 constexpr std::size_t kMostLevels = 7;
+constexpr double kLoopSeconds = 8;  // of fast movement: a few loops, not a felt of them
 
 /// Rows of some runs that pass a test, with the pressure's part of the torque taken off where asked.
 struct Rows {
@@ -53,12 +53,23 @@ Curve model_line(const JointView& view, Range angle, double velocity, std::strin
   return line(std::move(label), colour, x, y);
 }
 
+/// Whole runs where they can be drawn as a line; else the seconds around the fastest movement.
 Panel loop_panel(const JointView& view, const std::string& title, const RunView& run) {
   Panel panel{.title = title, .x = view.angle, .y = view.output};
   const estimate::RunResidual& rows = *run.residual;
-  panel.curves.push_back(loop("measured", colour::kMeasured, rows.angle, rows.measured));
-  Curve model = loop("model", colour::kModel, rows.angle, rows.predicted);
-  panel.curves.push_back(std::move(model));
+  const auto draw = [&](Window window) {
+    const auto part = [&](const std::vector<double>& v) {
+      return std::span(v).subspan(window.first, window.last - window.first);
+    };
+    Curve measured = loop("measured", colour::kMeasured, part(rows.angle), part(rows.measured));
+    measured.size = measured.mark == Mark::kLine ? 2.4 : measured.size;
+    panel.curves = {std::move(measured),
+                    loop("model", colour::kModel, part(rows.angle), part(rows.predicted))};
+    return panel.curves[0].mark == Mark::kLine && panel.curves[1].mark == Mark::kLine;
+  };
+  double seconds = rows.time.back() - rows.time.front();
+  if (run.speed > kSlowShare * view.fastest) seconds = std::min(seconds, kLoopSeconds);
+  while (!draw(fastest_window(rows, seconds)) && seconds > 1) seconds /= 2;
   return panel;
 }
 
@@ -67,23 +78,19 @@ Panel loop_panel(const JointView& view, const std::string& title, const RunView&
 MaybeFigure loops_figure(const JointView& view) {
   const std::string name =
       view.output_symbol + " over " + view.position_symbol + ", slow and fast (figs 3.3, 3.4 of the seed)";
+  const auto offset = [](const RunView& run) { return std::isfinite(run.level) ? std::abs(run.level) : 0.0; };
   const RunView* slow = nullptr;
   const RunView* fast = nullptr;
   for (const RunView& run : view.runs) {
     if (!run.constant_pressure || !(run.speed > 0)) continue;
-    const double level = std::isfinite(run.level) ? std::abs(run.level) : 0;
-    const auto nearer = [&](const RunView* best) {
-      return best == nullptr || level < (std::isfinite(best->level) ? std::abs(best->level) : 0);
-    };
-    if (run.speed < kSlowShare * view.fastest) {
-      if (nearer(slow)) slow = &run;
-    } else if (fast == nullptr || run.speed > fast->speed) {
-      fast = &run;
-    }
+    const bool is_slow = run.speed < kSlowShare * view.fastest;
+    if (!is_slow && run.speed < 0.6 * view.fastest) continue;  // neither slow nor fast
+    const RunView*& best = is_slow ? slow : fast;
+    if (best == nullptr || offset(run) < offset(*best)) best = &run;
   }
   if (slow == nullptr && fast == nullptr)
     return {.missing = name + ": no run at constant pressure in which the joint moves"};
-  Figure figure{.caption = view.output.label + " over " + view.angle.label +
+  Figure figure{.caption = view.output.label + " over " + lower_first(view.angle.label) +
                            " at constant pressure, measured and as the model "
                            "gives it. The width of the loop grows with speed: that is what C and D describe.",
                 .columns = slow != nullptr && fast != nullptr ? 2 : 1,
@@ -107,7 +114,9 @@ MaybeFigure pressure_family_figure(const JointView& view) {
       view.output_symbol + " over " + view.position_symbol + " for several Δp (fig 3.7 of the seed)";
   std::vector<const RunView*> members;
   for (const RunView& run : view.runs)
-    if (run.constant_pressure && run.speed > 0 && std::isfinite(run.level)) members.push_back(&run);
+    if (run.constant_pressure && run.speed > 0 && run.speed < kSlowShare * view.fastest &&
+        std::isfinite(run.level))
+      members.push_back(&run);
   std::sort(members.begin(), members.end(),
             [](const RunView* a, const RunView* b) { return a->level < b->level; });
   // Runs whose Δp differ by less than 0.1 kg/cm² show one level; the slowest of them is drawn.
@@ -119,22 +128,21 @@ MaybeFigure pressure_family_figure(const JointView& view) {
       levels.push_back(run);
     }
   }
-  if (levels.size() < 2) return {.missing = name + ": needs runs at two or more constant Δp"};
+  if (levels.size() < 2) return {.missing = name + ": needs slow runs at two or more constant Δp"};
   std::vector<const RunView*> shown;
   for (std::size_t k = 0; k < std::min(levels.size(), kMostLevels); ++k)
     shown.push_back(levels[k * (levels.size() - 1) / (std::min(levels.size(), kMostLevels) - 1)]);
   Figure figure{
-      .caption = view.output.label + " over " + view.angle.label +
+      .caption = view.output.label + " over " + lower_first(view.angle.label) +
                  " for constant pressure differences Δp in " + pretty_unit(view.pressure_unit) +
-                 " (slowest run of each level)" +
+                 " (the slowest run of each)" +
                  (view.seed_model ? "; thin black lines: static part of the model, A r² φ + B r Δp." : "."),
       .panel_height = 330};
   Panel panel{.x = view.angle, .y = view.output};
   for (std::size_t k = 0; k < shown.size(); ++k) {
     const estimate::RunResidual& rows = *shown[k]->residual;
-    panel.curves.push_back(
-        dots("Δp = " + number(std::round(shown[k]->level * view.pressure_scale * 100) / 100, 3),
-             colour::ordered(k, shown.size()), rows.angle, rows.measured, 700, 2.6));
+    panel.curves.push_back(dots("Δp = " + fixed_decimals(shown[k]->level * view.pressure_scale, 1),
+                                colour::ordered(k, shown.size()), rows.angle, rows.measured, 700, 2.6));
   }
   for (const RunView* run : shown) {
     if (!view.seed_model) break;
@@ -155,8 +163,9 @@ MaybeFigure bundle_figure(const JointView& view) {
   const Rows rows =
       collect(view, true, [](const RunView& run, std::size_t) { return run.constant_pressure; });
   if (rows.angle.size() < 2) return {.missing = name + ": no run at constant pressure"};
-  Figure figure{.caption = "Bundle: " + view.output.label + " less its pressure part B r Δp over " +
-                           view.angle.label + ", all runs at constant pressure. Dashed: A r² φ.",
+  Figure figure{.caption = "Bundle: " + lower_first(view.output.label) +
+                           " less its pressure part B r Δp over " + view.angle.label +
+                           ", all runs at constant pressure. Dashed: A r² φ.",
                 .panel_height = 260};
   Panel panel{.x = view.angle, .y = view.output};
   panel.y.label = "T − B r Δp";

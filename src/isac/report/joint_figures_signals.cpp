@@ -51,8 +51,9 @@ Figure signals_figure(const JointView& view, const RunView& run) {
   if (view.has_pressure) figure.panels.push_back(pressure_panel(view, run));
   Panel output{.x = view.time, .y = view.output};
   output.curves.push_back(line("measured", colour::kMeasured, rows.time, rows.measured));
+  output.curves.back().size = 2.4;
   Curve model = line("model", colour::kModel, rows.time, rows.predicted);
-  model.size = 1.2;
+  model.size = 1.1;
   output.curves.push_back(std::move(model));
   figure.panels.push_back(std::move(output));
   return figure;

@@ -60,7 +60,7 @@ void add_runs(Document& page, const JointView& view) {
     if (view.has_pressure) {
       const double low = quantile(rows.delta_pressure, 0.02) * view.pressure_scale;
       const double high = quantile(rows.delta_pressure, 0.98) * view.pressure_scale;
-      const auto rounded = [](double v) { return number(std::round(v * 100) / 100, 3); };
+      const auto rounded = [](double v) { return fixed_decimals(v, 2); };
       row.push_back(rounded(low) == rounded(high) ? rounded(low) : rounded(low) + " to " + rounded(high));
     }
     row.insert(row.end(), {number(run.speed, 2), number(run.residual->rmse, 3), rows.heldout ? "yes" : "no"});
@@ -117,7 +117,7 @@ void add_equation(Document& page, const JointView& view) {
   std::vector<std::string> lines = {view.output_symbol + " = " + letters,
                                     view.output_symbol + " = " + numbers};
   if (view.seed_model)
-    lines.push_back("with r = " + number(input.options.wheel_radius, 4) +
+    lines.push_back("with r = " + number(input.options.wheel_radius, 3) +
                     " m, φ in rad, φ̇ in rad/s, Δp = (p₂ − p₁)/2; B r Δp: B in N cm²/kg, Δp in kg/cm² (kg = "
                     "kgf), T in N m");
   for (std::string& note : where) lines.push_back(std::move(note));

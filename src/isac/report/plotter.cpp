@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "isac/core/error.hpp"
+#include "isac/report/plot_layout.hpp"
 #include "isac/report/text.hpp"
 
 extern char** environ;
@@ -28,15 +29,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFont = 12;    // pixels
-constexpr double kGlyph = 6.6;  // mean width of a glyph of that font
-constexpr double kLeft = 68;    // margins around a plot, pixels
-constexpr double kRight = 14;
-constexpr double kBottom = 44;
-constexpr double kBottomUnlabelled = 12;
-constexpr double kTop = 10;
-constexpr double kRow = 19;        // one row of title or legend
-constexpr double kKeySample = 34;  // legend sample and its gaps
+constexpr const char* kBandColour = "#c9d8e6";
 
 /// A folder of its own under the temporary directory, gone when the scope is left.
 class TemporaryFolder {
@@ -113,99 +106,6 @@ std::string quoted(const std::string& text) {
   return out + "'";
 }
 
-/// A step of 1, 2 or 5 times a power of ten that gives at most `most` ticks.
-double tick_step(double span, double most) {
-  const double raw = span / std::max(1.0, most);
-  const double power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0})
-    if (factor * power >= raw * (1 - 1e-9)) return factor * power;
-  return 10 * power;
-}
-
-std::string tick_format(double step, Range range) {
-  const double largest = std::max(std::abs(range.low), std::abs(range.high));
-  if (largest >= 1e6 || largest < 1e-3) return "%.3g";
-  const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
-  return fmt::format("%.{}f", decimals);
-}
-
-struct Placed {  // of one panel, pixels from the top left of the picture
-  double left = 0, top = 0, width = 0, height = 0;
-  double head = 0;       // rows of title and legend above the plot
-  bool key_row = false;  // the legend has rows of its own
-  double key_rows = 0;
-  bool x_labelled = true;
-};
-
-double legend_width(const Panel& panel) {
-  double width = 0;
-  for (const Curve& curve : panel.curves)
-    if (!curve.label.empty()) width += static_cast<double>(glyphs(curve.label)) * kGlyph + kKeySample;
-  return width;
-}
-
-std::size_t legend_entries(const Panel& panel) {
-  return static_cast<std::size_t>(std::count_if(panel.curves.begin(), panel.curves.end(),
-                                                [](const Curve& curve) { return !curve.label.empty(); }));
-}
-
-struct Layout {
-  std::vector<Placed> panels;
-  double width = 0, height = 0;
-};
-
-Layout lay_out(const Figure& figure) {
-  const auto columns = static_cast<std::size_t>(std::max(1, figure.columns));
-  const double cell = figure.width / static_cast<double>(columns);
-  Layout out{.panels = std::vector<Placed>(figure.panels.size()), .width = figure.width};
-  double y = 0;
-  for (std::size_t first = 0; first < figure.panels.size(); first += columns) {
-    const std::size_t last = std::min(first + columns, figure.panels.size());
-    double head = 0;
-    double height = 0;
-    const bool lowest = first + columns >= figure.panels.size();
-    for (std::size_t k = first; k < last; ++k) {
-      const Panel& panel = figure.panels[k];
-      Placed& placed = out.panels[k];
-      placed.left = cell * static_cast<double>(k - first) + kLeft;
-      placed.width = cell - kLeft - kRight;
-      const double title =
-          panel.title.empty() ? 0 : static_cast<double>(glyphs(panel.title) + 6) * kGlyph * 1.1;
-      const double key = legend_width(panel);
-      placed.key_row = key > 0 && title > 0 && title + key > placed.width;
-      double widest = 0;
-      for (const Curve& curve : panel.curves)
-        if (!curve.label.empty())
-          widest = std::max(widest, static_cast<double>(glyphs(curve.label)) * kGlyph + kKeySample);
-      const double per_row = std::max(1.0, std::floor(placed.width / std::max(1.0, widest)));
-      const bool one_row = key <= placed.width - (placed.key_row ? 0 : title);
-      placed.key_rows =
-          key <= 0 ? 0 : (one_row ? 1 : std::ceil(static_cast<double>(legend_entries(panel)) / per_row));
-      placed.head = kRow * ((title > 0 && (key <= 0 || placed.key_row) ? 1 : 0) + placed.key_rows);
-      placed.x_labelled = lowest || !figure.shared_x;
-      head = std::max(head, placed.head);
-      height = std::max(height, panel.height > 0 ? panel.height : figure.panel_height);
-    }
-    for (std::size_t k = first; k < last; ++k) {
-      out.panels[k].top = y + kTop + head;
-      out.panels[k].height = height;
-    }
-    y += kTop + head + height + (lowest || !figure.shared_x ? kBottom : kBottomUnlabelled);
-  }
-  out.height = y;
-  return out;
-}
-
-Range axis_range(const Axis& axis, Range data) {
-  Range out = data;
-  if (!axis.tight && !axis.log) out = padded(data, 0.05);
-  if (axis.log) out = {std::max(data.low, 1e-300) / 1.3, data.high * 1.3};
-  if (std::isfinite(axis.low)) out.low = axis.low;
-  if (std::isfinite(axis.high)) out.high = axis.high;
-  if (!(out.low < out.high)) out.high = out.low + 1;
-  return out;
-}
-
 std::string axis_text(const Axis& axis) {
   const std::string unit = pretty_unit(axis.unit);
   return unit.empty() ? axis.label : axis.label + " (" + unit + ")";
@@ -219,30 +119,6 @@ std::string dash_type(Dash dash) {
 
 std::string stroke(const Curve& curve) {
   return fmt::format("lc rgb '{}' lw {:.2f} {}", curve.colour, curve.size, dash_type(curve.dash));
-}
-
-std::string key_entry(const Curve& curve) {
-  std::string style;
-  switch (curve.mark) {
-    case Mark::kLine:
-    case Mark::kSteps:
-      style = "lines " + stroke(curve);
-      break;
-    case Mark::kRuns:
-    case Mark::kPoints:
-      style = fmt::format("points pt 7 ps {:.2f} lc rgb '{}'", 0.55, curve.colour);
-      break;
-    case Mark::kErrorBars:
-      style = fmt::format("points pt 7 ps 0.55 lc rgb '{}'", curve.colour);
-      break;
-    case Mark::kBand:
-      style = fmt::format("lines lc rgb '{}' lw 7", "#c9d8e6");
-      break;
-    case Mark::kBars:
-      style = fmt::format("lines lc rgb '{}' lw 7", curve.colour);
-      break;
-  }
-  return "keyentry with " + style + " title " + quoted(curve.label);
 }
 
 std::string plot_clause(const Curve& curve) {
@@ -259,9 +135,9 @@ std::string plot_clause(const Curve& curve) {
                          curve.colour);
     case Mark::kBand:
       return fmt::format("'-' using 1:2:3 with filledcurves fs solid noborder lc rgb '{}' notitle",
-                         "#c9d8e6");
+                         kBandColour);
     case Mark::kBars:
-      return fmt::format("'-' using 1:2 with boxes fs solid 0.85 border lc rgb '{}' notitle", curve.colour);
+      return fmt::format("'-' using 1:2 with boxes fs solid noborder lc rgb '{}' notitle", curve.colour);
   }
   return {};
 }
@@ -307,27 +183,52 @@ void send_ticks(Gnuplot& gnuplot, char axis, const Axis& description, Range rang
     return;
   }
   gnuplot << "unset logscale " << axis << "\n";
-  const double step = tick_step(range.span(), std::max(2.0, std::floor(pixels / per_tick)));
-  gnuplot << fmt::format("set {}tics {:.12g}\n", axis, step);
+  const double step = tick_step(range.span(), std::max(3.0, std::floor(pixels / per_tick)));
+  gnuplot << fmt::format("set {}tics {:.12g}{}\n", axis, step, axis == 'x' ? " offset 0,0.4" : "");
   gnuplot << fmt::format("set format {} '{}'\n", axis, labelled ? tick_format(step, range) : "");
 }
 
-void send_decorations(Gnuplot& gnuplot, const Panel& panel, const Placed& placed, const Layout& layout,
+std::string sample_stroke(const Curve& curve) {
+  if (curve.mark == Mark::kBand) return fmt::format("lc rgb '{}' lw 8", kBandColour);
+  if (curve.mark == Mark::kBars || curve.mark == Mark::kRuns)
+    return fmt::format("lc rgb '{}' lw 8", curve.colour);
+  return stroke(curve);
+}
+
+void send_decorations(Gnuplot& gnuplot, const Panel& panel, const PlacedPanel& placed, const Layout& layout,
                       const std::string& letter) {
   gnuplot << "unset label\nunset arrow\nunset object\n";
   const auto screen_y = [&](double pixels) { return 1 - pixels / layout.height; };
-  if (!panel.title.empty()) {
-    const double rows = placed.key_row ? placed.key_rows : 0;
-    gnuplot << fmt::format(
-        "set label {} at screen {:.6f},{:.6f} left front tc rgb '#222222' font 'Arial Bold,{}'\n",
-        quoted(letter + panel.title), placed.left / layout.width, screen_y(placed.top - 9 - kRow * rows),
-        kFont);
+  const auto screen_x = [&](double pixels) { return pixels / layout.width; };
+  const auto text = [&](const std::string& words, double x, double y, const std::string& rest) {
+    gnuplot << fmt::format("set label {} at screen {:.6f},{:.6f} {} front tc rgb '#222222'\n", quoted(words),
+                           screen_x(x), screen_y(y), rest);
+  };
+  if (!panel.title.empty())
+    text(letter + panel.title, placed.left, placed.title_y,
+         fmt::format("left font 'Arial Bold,{}'", kFontSize));
+  text(axis_text(panel.y), placed.left - kLeftMargin + 14, placed.top + 0.5 * placed.height,
+       "center rotate by 90");
+  if (placed.x_labelled)
+    text(axis_text(panel.x), placed.left + 0.5 * placed.width, placed.top + placed.height + 34, "center");
+  for (const LegendEntry& entry : placed.legend) {
+    const double middle = entry.left + 0.5 * kSampleWidth;
+    if (entry.curve->mark == Mark::kPoints || entry.curve->mark == Mark::kErrorBars) {
+      gnuplot << fmt::format("set label '' at screen {:.6f},{:.6f} front point pt 7 ps 0.6 lc rgb '{}'\n",
+                             screen_x(middle), screen_y(entry.y), entry.curve->colour);
+    } else {
+      gnuplot << fmt::format(
+          "set arrow from screen {0:.6f},{1:.6f} to screen {2:.6f},{1:.6f} nohead front {3}\n",
+          screen_x(entry.left), screen_y(entry.y), screen_x(entry.left + kSampleWidth),
+          sample_stroke(*entry.curve));
+    }
+    text(entry.curve->label, entry.left + kSampleWidth + 6, entry.y, "left");
   }
   for (std::size_t i = 0; i < panel.notes.size(); ++i) {
     gnuplot << fmt::format(
         "set label {} at screen {:.6f},{:.6f} left front tc rgb '#222222' font 'Arial,{}'\n",
         quoted(panel.notes[i]), (placed.left + 8) / layout.width,
-        screen_y(placed.top + 13 + 16 * static_cast<double>(i)), kFont - 1);
+        screen_y(placed.top + 13 + 16 * static_cast<double>(i)), kFontSize - 1);
   }
   for (const ReferenceLine& mark : panel.lines) {
     if (mark.vertical) {
@@ -341,7 +242,7 @@ void send_decorations(Gnuplot& gnuplot, const Panel& panel, const Placed& placed
         mark.vertical ? fmt::format("first {:.12g}, graph 0.96 left offset character 0.4,0", mark.at)
                       : fmt::format("graph 0.995, first {:.12g} right offset character 0,0.5", mark.at);
     gnuplot << fmt::format("set label {} at {} front tc rgb '#555555' font 'Arial,{}'\n", quoted(mark.label),
-                           at, kFont - 1);
+                           at, kFontSize - 1);
   }
   for (const Box& box : panel.boxes) {
     gnuplot << fmt::format(
@@ -352,7 +253,7 @@ void send_decorations(Gnuplot& gnuplot, const Panel& panel, const Placed& placed
   }
 }
 
-void send_panel(Gnuplot& gnuplot, const Panel& panel, const Placed& placed, const Layout& layout,
+void send_panel(Gnuplot& gnuplot, const Panel& panel, const PlacedPanel& placed, const Layout& layout,
                 const std::string& letter) {
   Range data_x = data_range_x(panel);
   Range data_y = data_range_y(panel);
@@ -370,31 +271,15 @@ void send_panel(Gnuplot& gnuplot, const Panel& panel, const Placed& placed, cons
                          1 - placed.top / layout.height, 1 - (placed.top + placed.height) / layout.height);
   gnuplot << fmt::format("set xrange [{:.12g}:{:.12g}]\nset yrange [{:.12g}:{:.12g}]\n", x.low, x.high, y.low,
                          y.high);
-  send_ticks(gnuplot, 'x', panel.x, x, placed.width, 64, placed.x_labelled);
-  send_ticks(gnuplot, 'y', panel.y, y, placed.height, 34, true);
-  gnuplot << "set xlabel " << quoted(placed.x_labelled ? axis_text(panel.x) : "") << " offset 0,0.2\n";
-  gnuplot << fmt::format("set ylabel '' \n");
+  send_ticks(gnuplot, 'x', panel.x, x, placed.width, placed.width < 250 ? 44 : 60, placed.x_labelled);
+  send_ticks(gnuplot, 'y', panel.y, y, placed.height, 27, true);
   send_decorations(gnuplot, panel, placed, layout, letter);
-  gnuplot << fmt::format("set label {} at screen {:.6f},{:.6f} center rotate by 90 front font 'Arial,{}'\n",
-                         quoted(axis_text(panel.y)), (placed.left - kLeft + 15) / layout.width,
-                         1 - (placed.top + 0.5 * placed.height) / layout.height, kFont);
-  if (placed.key_rows > 0) {
-    gnuplot << fmt::format(
-        "set key at screen {:.6f},{:.6f} right bottom horizontal Left reverse samplen 1.6 spacing "
-        "1.1 maxrows {:.0f} font 'Arial,{}'\n",
-        (placed.left + placed.width) / layout.width, 1 - (placed.top - 4) / layout.height, placed.key_rows,
-        kFont);
-  } else {
-    gnuplot << "unset key\n";
-  }
   gnuplot << "plot ";
   const char* separator = "";
   for (const Curve& curve : panel.curves) {
     gnuplot << separator << plot_clause(curve);
     separator = ", ";
   }
-  for (const Curve& curve : panel.curves)
-    if (!curve.label.empty()) gnuplot << separator << key_entry(curve);
   gnuplot << "\n";
   for (const Curve& curve : panel.curves) send_data(gnuplot, curve, x);
 }
@@ -403,14 +288,14 @@ void send_figure(Gnuplot& gnuplot, const Figure& figure, const fs::path& file) {
   const Layout layout = lay_out(figure);
   gnuplot << fmt::format(
       "set terminal svg size {:.0f},{:.0f} dynamic noenhanced rounded font 'Arial,{}' name 'p'\n",
-      layout.width, layout.height, kFont);
+      layout.width, layout.height, kFontSize);
   gnuplot << "set encoding utf8\nset minussign\nset output " << quoted(file.string()) << "\n";
   gnuplot << "set datafile missing 'nan'\nset border 3 lw 0.9 lc rgb '#555555'\nset tics out nomirror scale "
              "0.5 tc rgb "
-             "'#222222'\nset mxtics 1\nset mytics 1\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
+             "'#222222'\nset pointintervalbox 0\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
              "1\nset bars "
              "0.5\nset boxwidth 0.95 relative\n";
-  gnuplot << "set multiplot\n";
+  gnuplot << "unset key\nset multiplot\n";
   const std::size_t titled = static_cast<std::size_t>(std::count_if(
       figure.panels.begin(), figure.panels.end(), [](const Panel& panel) { return !panel.title.empty(); }));
   for (std::size_t k = 0; k < figure.panels.size(); ++k) {

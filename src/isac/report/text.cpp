@@ -88,6 +88,10 @@ std::string number(double value, int digits) {
   return fixed(value, std::max(0, digits - 1 - size));
 }
 
+std::string fixed_decimals(double value, int decimals) {
+  return std::isfinite(value) ? fixed(value, decimals) : number(value);
+}
+
 std::string whole(double value) {
   if (!std::isfinite(value)) return "–";
   std::string text = fmt::format("{:.0f}", std::abs(value));

@@ -12,6 +12,8 @@ namespace isac::report {
 
 /// `digits` significant digits, true minus sign, "–" for NaN; below 1e-4 and from 1e7 on as "1.2 · 10⁻⁵".
 [[nodiscard]] std::string number(double value, int digits = 4);
+/// `decimals` digits behind the point, true minus sign, no minus before zero.
+[[nodiscard]] std::string fixed_decimals(double value, int decimals);
 [[nodiscard]] std::string whole(double value);  ///< a count: "1 234 567", thin spaces
 /// A p-value: two digits, "< 0.001" below.
 [[nodiscard]] std::string probability(double p);
