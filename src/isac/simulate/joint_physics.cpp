@@ -5,6 +5,8 @@
 #include <string>
 
 #include "isac/core/error.hpp"
+#include "isac/models/joint_torque.hpp"
+#include "isac/models/valve_unit.hpp"
 
 namespace isac::simulate {
 
@@ -65,12 +67,10 @@ models::JointPoint<double> JointPhysics::point_of(const StatePoint& point) const
 }
 
 Torques JointPhysics::torques(const StatePoint& point) const noexcept {
-  namespace effect = models::effect;
   const models::JointPoint<double> p = point_of(point);
   Torques t;
-  // T = A r² φ + B r Δp − C φ̇³ − D φ̇ (eq 3.10)
-  t.muscle = effect::Stiffness::torque(&joint_.A, p) + effect::Pressure::torque(&joint_.B, p) +
-             effect::CubicDamping::torque(&joint_.C, p) + effect::ViscousDamping::torque(&joint_.D, p);
+  t.muscle = models::joint_torque<double>({.A = joint_.A, .B = joint_.B, .C = joint_.C, .D = joint_.D},
+                                          p.wheel_radius, p.angle, p.delta_pressure, p.velocity);
   for (const TorqueEffect& e : torque_effects_) {
     const double torque =
         models::effect_torque(e.effect.index, e.effect.parameters.data(), p, point.x.data() + e.state);
@@ -91,7 +91,8 @@ void JointPhysics::rates(const StatePoint& point, const std::array<double, 2>& r
   for (std::size_t i = 0; i < 2; ++i) {
     // T ṗ + p = K u + b (eq 4.1); a muscle is never below the pressure of the room.
     const double target = std::max(0.0, (valves_[i].gain * reference[i] + valves_[i].offset) / kPascal);
-    dxdt[i] = (target - point.x[i]) / (target > point.x[i] ? valves_[i].fill_lag : valves_[i].vent_lag);
+    const double lag = target > point.x[i] ? valves_[i].fill_lag : valves_[i].vent_lag;
+    dxdt[i] = models::valve_rate<double>({.gain = 1, .lag = lag}, point.x[i], target);
   }
   if (torque_effects_.empty()) return;
   const models::JointPoint<double> p = point_of(point);
