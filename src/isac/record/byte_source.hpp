@@ -40,6 +40,9 @@ class ByteSource {
     begin_ = static_cast<std::size_t>(position - buffer_.data());
   }
 
+  /// Forgets the bytes of the window behind its beginning `kept`.
+  void drop_behind(std::string_view kept) noexcept { end_ = begin_ + kept.size(); }
+
   /// Reads one more piece behind `end` (pointers into the window become invalid); false at the end of the bytes.
   bool fill();
   /// Puts a line feed behind the last byte; only after fill() said false.

@@ -100,26 +100,28 @@ bool is_iso8601(std::string_view text) noexcept {
   return zone(text, i);
 }
 
-void check_text(std::string_view line, Place place) {
-  const auto control = std::find_if(line.begin(), line.end(), [](char c) {
-    const auto byte = static_cast<std::uint8_t>(c);
-    return (byte < 0x20 && byte != '\t' && byte != '\r') || byte == 0x7F;
-  });
-  if (control != line.end()) {
-    const auto at = static_cast<std::size_t>(control - line.begin());
-    place.column = character_column(line, at);
-    throw Error(ErrorKind::kBadInput, "file_binary",
-                "holds the control byte " + shown(line.substr(at, 1)) +
-                    ", so this is no text file; export the recording as CSV",
-                place);
+void check_text(std::string_view text, Place place) {
+  const auto refuse_at = [&](std::size_t at, const char* code, const std::string& sentence) {
+    place.column = std::max(place.column, 1L) - 1 + character_column(text, at);
+    throw Error(ErrorKind::kBadInput, code, sentence, place);
+  };
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    const auto byte = static_cast<std::uint8_t>(text[at]);
+    if (byte == '\r' && at + 1 < text.size()) {
+      refuse_at(at, "line_ends_cr",
+                "a carriage return stands alone; save the file with line feeds, e.g. with `tr '\\r' '\\n'`");
+    }
+    if ((byte < 0x20 && byte != '\t' && byte != '\r') || byte == 0x7F) {
+      refuse_at(at, "file_binary",
+                "holds the control byte " + shown(text.substr(at, 1)) +
+                    ", so this is no text file; export the recording as CSV");
+    }
   }
-  const std::size_t at = find_invalid_utf8(line);
+  const std::size_t at = find_invalid_utf8(text);
   if (at != std::string_view::npos) {
-    place.column = character_column(line, at);
-    throw Error(ErrorKind::kBadInput, "not_utf8",
-                "the byte " + shown(line.substr(at, 1)) +
-                    " is not UTF-8; save the file as UTF-8, e.g. with `iconv -f latin1 -t utf-8`",
-                place);
+    refuse_at(at, "not_utf8",
+              "the byte " + shown(text.substr(at, 1)) +
+                  " is not UTF-8; save the file as UTF-8, e.g. with `iconv -f latin1 -t utf-8`");
   }
 }
 

@@ -33,7 +33,7 @@ class Metadata {
 /// "2003-05-01", "2003-05-01T14:30", with seconds, fractions, and a zone Z or ±HH:MM.
 [[nodiscard]] bool is_iso8601(std::string_view text) noexcept;
 
-/// Throws not_utf8 or file_binary if `line` is not clean text; `place.column` is filled in.
-void check_text(std::string_view line, Place place);
+/// Throws not_utf8, file_binary or line_ends_cr if `text`, which begins at `place`, is not clean text of one line.
+void check_text(std::string_view text, Place place);
 
 }  // namespace isac::record

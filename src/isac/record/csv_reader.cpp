@@ -19,13 +19,14 @@ std::string_view without_carriage_return(std::string_view line) noexcept {
   return line;
 }
 
-// The first line of `text` that is neither blank nor a remark, or nothing.
+// The first line of `text` that is neither blank nor a remark and ends with a line feed, or nothing.
 std::string_view first_row(std::string_view text) noexcept {
   while (!text.empty()) {
-    const std::size_t stop = std::min(text.find('\n'), text.size());
+    const std::size_t stop = text.find('\n');
+    if (stop == std::string_view::npos) return {};
     const std::string_view line = text.substr(0, stop);
     if (!line.starts_with('#') && !trimmed(line).empty()) return line;
-    text.remove_prefix(std::min(stop + 1, text.size()));
+    text.remove_prefix(stop + 1);
   }
   return {};
 }
@@ -74,14 +75,16 @@ struct BlockReader::State {
     last_line_end.reset();  // fill() moves the window
     if (source.fill()) return true;
     at_end = true;
-    if (source.window().empty()) return false;
-    cut_off = true;
+    const std::string_view window = source.window();
+    if (window.empty() || window.ends_with('\n')) return false;
     if (header_read && metadata.has("log", "append-only") && !metadata.values().contains("closed")) {
       // An append-only log that was not closed: its writer was killed, and the line that it was writing is torn.
-      metadata.set("torn_line", std::to_string(rows ? rows->next_line() : line + 1));
-      source.consume_to(source.end());
+      const long first = rows ? rows->next_line() : line;
+      metadata.set("torn_line", std::to_string(first + std::count(window.begin(), window.end(), '\n')));
+      source.drop_behind(window.substr(0, window.rfind('\n') + 1));  // npos + 1 is 0
       return false;
     }
+    cut_off = true;
     source.terminate();
     return true;
   }

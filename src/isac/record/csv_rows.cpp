@@ -75,7 +75,7 @@ void RowParser::decide_decimal_sign(const char* p, const char* end) noexcept {
 
 const char* RowParser::parse(const char* p, const char* end, std::size_t most_rows,
                              std::vector<series::Column>& columns, Metadata& metadata, bool cut_off) {
-  cut_off_ = cut_off;
+  cut_off_end_ = cut_off ? end - 1 : nullptr;
   if (!decimal_sign_known_) decide_decimal_sign(p, end);
   const std::size_t last = header_.columns.size() - 1;
   const std::size_t stride = stage_rows_;
@@ -201,7 +201,7 @@ Place RowParser::place(const char* row, const char* at) const {
 
 void RowParser::refuse_length(const char* row, const char* at, std::size_t found) const {
   const std::string wanted = std::to_string(header_.columns.size());
-  if (found < header_.columns.size() && cut_off_) {
+  if (found < header_.columns.size() && at == cut_off_end_) {
     throw Error(ErrorKind::kBadInput, "line_cut_off",
                 "the file ends in the middle of this row, after " + std::to_string(found) + " of " + wanted +
                     " cells; remove the row, or copy the file again",
@@ -224,11 +224,6 @@ void RowParser::refuse_cell(const char* row, std::string_view cell, std::size_t 
   const Place where = place(row, cell.data());
   const std::string in_column = " in the column " + shown(header_.columns[column].name);
   check_text(cell, where);
-  if (cell.find('\r') != std::string_view::npos) {
-    throw Error(ErrorKind::kBadInput, "line_ends_cr",
-                "a carriage return stands alone; save the file with line feeds, e.g. with `tr '\\r' '\\n'`",
-                where);
-  }
   double value = 0.0;
   const auto result = fast_float::from_chars_advanced(
       cell.data(), cell.data() + cell.size(), value,

@@ -56,7 +56,7 @@ class RowParser {
   std::vector<double> stage_;  ///< stage_[column · stage_rows_ + row]
   char decimal_sign_ = '.';
   bool decimal_sign_known_;
-  bool cut_off_ = false;
+  const char* cut_off_end_ = nullptr;  ///< the line feed that the file does not have
   double last_time_;
   std::size_t rows_ = 0;
   long next_line_;
