@@ -1,0 +1,232 @@
+#include "isac/estimate/motion_pass.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/series/simd.hpp"
+
+namespace isac::estimate::motion {
+namespace {
+
+#define ISAC_INLINE inline __attribute__((always_inline))
+
+struct Constants {
+  double stiffness, gain, cubic, viscous, friction, gravity, inverse_inertia, inverse_lag,
+      inverse_friction_speed;
+  double wheel, wheel2;
+};
+
+Constants constants_of(const MotionVector& p, const MotionOptions& options) {
+  const double r = options.wheel_radius;
+  return {.stiffness = p[kA] * r * r,
+          .gain = p[kB] * r,
+          .cubic = p[kC],
+          .viscous = p[kD],
+          .friction = p[kFriction],
+          .gravity = options.gravity_torque,
+          .inverse_inertia = 1.0 / p[kInertia],
+          .inverse_lag = 1.0 / p[kLag],
+          .inverse_friction_speed = 1.0 / options.friction_speed,
+          .wheel = r,
+          .wheel2 = r * r};
+}
+
+struct Point {
+  double phi, omega, q;
+};
+
+struct Rates {
+  double phi, omega, q;
+  double tanh_value, sin_value;
+};
+
+ISAC_INLINE Rates rates(const Constants& k, const Point& x, double command) {
+  Rates d;
+  d.tanh_value = k.friction != 0 ? std::tanh(x.omega * k.inverse_friction_speed) : 0.0;
+  d.sin_value = k.gravity != 0 ? std::sin(x.phi) : 0.0;
+  d.phi = x.omega;
+  d.omega = (k.gain * x.q + k.stiffness * x.phi - k.cubic * x.omega * x.omega * x.omega -
+             k.viscous * x.omega - k.friction * d.tanh_value - k.gravity * d.sin_value) *
+            k.inverse_inertia;
+  d.q = (command - x.q) * k.inverse_lag;
+  return d;
+}
+
+struct Lanes {
+  alignas(64) double phi[kLanes], omega[kLanes], q[kLanes];
+};
+
+/// Rates of the sensitivities at a stage: F_x s + F_θ.
+ISAC_INLINE void lane_rates(const Constants& k, const Point& x, const Rates& d, const Lanes& s, Lanes& ds,
+                            double tanh_known) {
+  const double cos_value = k.gravity != 0 ? std::cos(x.phi) : 0.0;
+  const double a = (k.stiffness - k.gravity * cos_value) * k.inverse_inertia;
+  const double b = -(3 * k.cubic * x.omega * x.omega + k.viscous +
+                     k.friction * k.inverse_friction_speed * (1 - tanh_known * tanh_known)) *
+                   k.inverse_inertia;
+  const double c = k.gain * k.inverse_inertia;
+  alignas(64) double force[kLanes] = {
+      -d.omega * k.inverse_inertia,      k.wheel2 * x.phi * k.inverse_inertia,
+      k.wheel * x.q * k.inverse_inertia, -x.omega * x.omega * x.omega * k.inverse_inertia,
+      -x.omega * k.inverse_inertia,      -tanh_known * k.inverse_inertia};
+  for (int j = 0; j < kLanes; ++j) ds.phi[j] = s.omega[j];
+  for (int j = 0; j < kLanes; ++j) ds.omega[j] = a * s.phi[j] + b * s.omega[j] + c * s.q[j] + force[j];
+  for (int j = 0; j < kLanes; ++j) ds.q[j] = -k.inverse_lag * s.q[j];
+  ds.q[kLag] -= d.q * k.inverse_lag;
+}
+
+ISAC_INLINE void shifted(const Lanes& s, const Lanes& ds, double h, Lanes& out) {
+  for (int j = 0; j < kLanes; ++j) out.phi[j] = s.phi[j] + h * ds.phi[j];
+  for (int j = 0; j < kLanes; ++j) out.omega[j] = s.omega[j] + h * ds.omega[j];
+  for (int j = 0; j < kLanes; ++j) out.q[j] = s.q[j] + h * ds.q[j];
+}
+
+ISAC_INLINE Point moved(const Point& x, const Rates& d, double h) {
+  return {x.phi + h * d.phi, x.omega + h * d.omega, x.q + h * d.q};
+}
+
+ISAC_INLINE Point combined(const Point& x, const Rates& a, const Rates& b, const Rates& c, const Rates& d,
+                           double h) {
+  return {x.phi + h / 6 * (a.phi + 2 * (b.phi + c.phi) + d.phi),
+          x.omega + h / 6 * (a.omega + 2 * (b.omega + c.omega) + d.omega),
+          x.q + h / 6 * (a.q + 2 * (b.q + c.q) + d.q)};
+}
+
+ISAC_INLINE Point step(const Constants& k, const Point& x, double h, double u0, double u1) {
+  const double middle = 0.5 * (u0 + u1);
+  const Rates a = rates(k, x, u0);
+  const Rates b = rates(k, moved(x, a, h / 2), middle);
+  const Rates c = rates(k, moved(x, b, h / 2), middle);
+  const Rates d = rates(k, moved(x, c, h), u1);
+  return combined(x, a, b, c, d, h);
+}
+
+/// State and sensitivities one step on.
+ISAC_INLINE Point step_with_lanes(const Constants& k, const Point& x, Lanes& s, double h, double u0,
+                                  double u1) {
+  const double middle = 0.5 * (u0 + u1);
+  // tanh is needed even where T_c is zero now: its column −tanh/I is what could lift it from zero.
+  const auto tanh_at = [&k](const Point& y, const Rates& d) {
+    return k.friction != 0 ? d.tanh_value : std::tanh(y.omega * k.inverse_friction_speed);
+  };
+  Lanes da, db, dc, dd, t;
+  const Rates a = rates(k, x, u0);
+  lane_rates(k, x, a, s, da, tanh_at(x, a));
+  const Point xb = moved(x, a, h / 2);
+  const Rates b = rates(k, xb, middle);
+  shifted(s, da, h / 2, t);
+  lane_rates(k, xb, b, t, db, tanh_at(xb, b));
+  const Point xc = moved(x, b, h / 2);
+  const Rates c = rates(k, xc, middle);
+  shifted(s, db, h / 2, t);
+  lane_rates(k, xc, c, t, dc, tanh_at(xc, c));
+  const Point xd = moved(x, c, h);
+  const Rates d = rates(k, xd, u1);
+  shifted(s, dc, h, t);
+  lane_rates(k, xd, d, t, dd, tanh_at(xd, d));
+  const double w = h / 6;
+  for (int j = 0; j < kLanes; ++j) s.phi[j] += w * (da.phi[j] + 2 * (db.phi[j] + dc.phi[j]) + dd.phi[j]);
+  for (int j = 0; j < kLanes; ++j)
+    s.omega[j] += w * (da.omega[j] + 2 * (db.omega[j] + dc.omega[j]) + dd.omega[j]);
+  for (int j = 0; j < kLanes; ++j) s.q[j] += w * (da.q[j] + 2 * (db.q[j] + dc.q[j]) + dd.q[j]);
+  return combined(x, a, b, c, d, h);
+}
+
+ISAC_INLINE bool sane(const Point& x) {
+  return std::abs(x.phi) < 1e6 && std::abs(x.omega) < 1e9;
+}
+
+ISAC_SIMD bool predict_rows(const Prepared& run, const Constants& k, Point x, double* angles) {
+  const std::size_t n = run.time.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    angles[i] = x.phi;
+    if (i + 1 == n) break;
+    const int pieces = run.substeps[i];
+    const double h = (run.time[i + 1] - run.time[i]) / pieces;
+    const double slope = (run.command[i + 1] - run.command[i]) / pieces;
+    for (int piece = 0; piece < pieces; ++piece) {
+      x = step(k, x, h, run.command[i] + piece * slope, run.command[i] + (piece + 1) * slope);
+    }
+    if (!sane(x)) return false;
+  }
+  return true;
+}
+
+ISAC_SIMD bool accumulate_rows(const Prepared& run, const Constants& k, Point x, std::size_t block_rows,
+                               std::vector<Sums>& blocks) {
+  Lanes s = {};
+  s.phi[kInitialAngle] = 1;
+  s.omega[kInitialSpeed] = 1;
+  const std::size_t n = run.time.size();
+  Sums* sums = nullptr;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (sums == nullptr || sums->rows == block_rows) sums = &blocks.emplace_back();
+    const double e = run.angle[i] - x.phi;
+    sums->square += e * e;
+    ++sums->rows;
+    for (int row = 0; row < kLanes; ++row) {
+      const double weight = s.phi[row];
+      for (int j = 0; j < kLanes; ++j) sums->gram[row][j] += weight * s.phi[j];
+    }
+    for (int j = 0; j < kLanes; ++j) sums->moment[j] += e * s.phi[j];
+    if (i + 1 == n) break;
+    const int pieces = run.substeps[i];
+    const double h = (run.time[i + 1] - run.time[i]) / pieces;
+    const double slope = (run.command[i + 1] - run.command[i]) / pieces;
+    for (int piece = 0; piece < pieces; ++piece) {
+      x = step_with_lanes(k, x, s, h, run.command[i] + piece * slope, run.command[i] + (piece + 1) * slope);
+    }
+    if (!sane(x)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Prepared prepare(const MotionRun& run, const MotionOptions& options) {
+  Prepared ready;
+  for (std::size_t i = 0; i < run.time.size(); ++i) {
+    if (!std::isfinite(run.time[i]) || !std::isfinite(run.angle[i])) continue;
+    ready.time.push_back(run.time[i]);
+    ready.angle.push_back(run.angle[i]);
+    ready.source_row.push_back(i);
+  }
+  // The command at t − L: linear between its samples, held at the ends, missing samples bridged.
+  std::vector<double> times, values;
+  for (std::size_t i = 0; i < run.time.size(); ++i) {
+    if (!std::isfinite(run.time[i]) || !std::isfinite(run.command[i])) continue;
+    times.push_back(run.time[i]);
+    values.push_back(run.command[i]);
+  }
+  if (times.empty()) return {};
+  ready.command.reserve(ready.time.size());
+  std::size_t at = 0;
+  for (const double time : ready.time) {
+    const double wanted = time - options.dead_time;
+    while (at + 1 < times.size() && times[at + 1] <= wanted) ++at;
+    double value = values[at];
+    if (wanted > times[at] && at + 1 < times.size()) {
+      value += (values[at + 1] - values[at]) * (wanted - times[at]) / (times[at + 1] - times[at]);
+    }
+    ready.command.push_back(value);
+  }
+  for (std::size_t i = 0; i + 1 < ready.time.size(); ++i) {
+    const double pieces = std::ceil((ready.time[i + 1] - ready.time[i]) / options.max_step - 1e-9);
+    ready.substeps.push_back(static_cast<int>(std::clamp(pieces, 1.0, 1e6)));
+  }
+  return ready;
+}
+
+bool predict(const Prepared& run, const State& state, const MotionOptions& options, double* angles) {
+  const double q = options.initial_rest ? 0.0 : run.command.front();
+  return predict_rows(run, constants_of(state.parameters, options), {state.angle, state.speed, q}, angles);
+}
+
+bool accumulate(const Prepared& run, const State& state, const MotionOptions& options, std::size_t block_rows,
+                std::vector<Sums>& blocks) {
+  const double q = options.initial_rest ? 0.0 : run.command.front();
+  return accumulate_rows(run, constants_of(state.parameters, options), {state.angle, state.speed, q},
+                         block_rows == 0 ? run.time.size() + 1 : block_rows, blocks);
+}
+
+}  // namespace isac::estimate::motion
