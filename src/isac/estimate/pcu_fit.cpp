@@ -46,9 +46,9 @@ std::vector<Window> windows_of(const PcuRun& run, const PcuFitOptions& options, 
     if (*high > *low) {
       bool first = true;
       for (const CommandStep& s : find_command_steps(run.time, run.command, std::max(least, 1e-300))) {
-        // Behind an earlier step only the last fifth of the hold counts as "before": there the pressure has settled.
+        // Behind an earlier step the second half of the hold counts as "before"; what is left of that step is taken off.
         const double hold = s.time - s.previous_time;
-        out.push_back({s.time, s.time - (first ? 1.0 : 0.2) * hold, s.next_time, s.from, s.to, true});
+        out.push_back({s.time, s.time - (first ? 1.0 : 0.5) * hold, s.next_time, s.from, s.to, true});
         first = false;
       }
       if (out.empty())
@@ -149,14 +149,16 @@ void set_dead_time(PcuStep& step, const StepFit& fit, const Window& w, Warnings&
   }
 }
 
-PcuStep fit_one(const PcuRun& run, const Window& w, const PcuFitOptions& options, Warnings& warnings,
+PcuStep fit_one(const PcuRun& run, const Window& w, const PcuFitOptions& options, std::vector<Tail>& tails,
                 PcuFit& total) {
+  Warnings& warnings = total.warnings;
   PcuStep step;
   step.run = run.name;
   if (w.time_known) step.step_time = w.step_time;
   step.command_from = w.from;
   step.command_to = w.to;
-  const StepData data = cut_step(run, w.step_time, w.begin, w.end, options.leave_out_spikes);
+  StepData data = cut_step(run, w.step_time, w.begin, w.end, options.leave_out_spikes);
+  for (const Tail& tail : tails) remove_tail(data, w.step_time, tail);
   step.samples = data.y.size();
   step.spikes = data.spikes;
   step.noise = data.noise;
@@ -170,9 +172,12 @@ PcuStep fit_one(const PcuRun& run, const Window& w, const PcuFitOptions& options
     return step;
   }
   const auto [low, gain, lag, onset] = fit.parameters;
+  tails.push_back({.size = gain, .lag = lag, .onset = w.step_time + onset});
   const double dof = fit.degrees_of_freedom;
   step.level_from = low;
   step.level_to = low + gain;
+  step.level_to_error =
+      std::sqrt(std::max(0.0, fit.covariance(0, 0) + fit.covariance(1, 1) + 2 * fit.covariance(0, 1)));
   step.rmse = std::sqrt(fit.sse / static_cast<double>(step.samples));
   step.lag = estimate("T_C", "s", lag, fit.covariance(2, 2), dof);
   const double change = w.to - w.from;
@@ -191,9 +196,9 @@ PcuStep fit_one(const PcuRun& run, const Window& w, const PcuFitOptions& options
   step.adequacy = judge_step(data, fit, w.time_known ? 0.0 : data.s.front(), options.first_order_tolerance);
   for (std::size_t i = 0; i < data.s.size(); ++i) {
     step.time.push_back(w.step_time + data.s[i]);
-    step.predicted.push_back(data.y[i] - fit.residuals[i]);
+    step.predicted.push_back(data.reading[i] - fit.residuals[i]);
   }
-  step.measured = data.y;
+  step.measured = data.reading;
   total.converged = total.converged && fit.converged;
   total.solver_summary = fit.summary;
   total.samples += step.samples;
@@ -233,8 +238,9 @@ PcuFit fit_pcu(std::span<const PcuRun> runs, const PcuFitOptions& options) {
     check_columns(run);
     any_row = any_row || std::any_of(run.pressure.begin(), run.pressure.end(),
                                      [](double p) { return std::isfinite(p); });
+    std::vector<Tail> tails;
     for (const Window& w : windows_of(run, options, fit.warnings))
-      fit.steps.push_back(fit_one(run, w, options, fit.warnings, fit));
+      fit.steps.push_back(fit_one(run, w, options, tails, fit));
   }
   if (!any_row)
     throw Error(ErrorKind::kAnswerIsNo, "no_usable_data",

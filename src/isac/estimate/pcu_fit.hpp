@@ -102,9 +102,10 @@ struct PcuStep {
   Estimated lag;        ///< "T_C", s
   Estimated dead_time;  ///< "dead_time", s
   Estimated start;      ///< "start", s: when the pressure begins to rise, in the recording's time
-  double level_from = std::numeric_limits<double>::quiet_NaN();  ///< Pa, fitted p_a
-  double level_to = std::numeric_limits<double>::quiet_NaN();    ///< Pa, fitted p_b
-  double rmse = std::numeric_limits<double>::quiet_NaN();        ///< Pa
+  double level_from = std::numeric_limits<double>::quiet_NaN();      ///< Pa, fitted p_a
+  double level_to = std::numeric_limits<double>::quiet_NaN();        ///< Pa, fitted p_b
+  double level_to_error = std::numeric_limits<double>::quiet_NaN();  ///< Pa, standard error of p_b
+  double rmse = std::numeric_limits<double>::quiet_NaN();            ///< Pa
   double noise =
       std::numeric_limits<double>::quiet_NaN();  ///< Pa, standard deviation of the sample-to-sample noise
   double sample_time = std::numeric_limits<double>::quiet_NaN();  ///< s, median

@@ -21,13 +21,32 @@ std::vector<Estimated> collect(const PcuFit& fit, Member member, const StepDirec
   return out;
 }
 
+// Two steps that follow each other share a hold: the level behind the one is the level before the other. The mean over
+// the whole hold and the mean over its second half have the variance of the former as their covariance.
+std::vector<double> shared_levels(const PcuFit& fit) {
+  std::vector<double> out;
+  for (std::size_t i = 0; i + 1 < fit.steps.size(); ++i) {
+    const PcuStep &a = fit.steps[i], &b = fit.steps[i + 1];
+    const double change_a = a.command_to - a.command_from, change_b = b.command_to - b.command_from;
+    const double covariance = -a.level_to_error * a.level_to_error / (change_a * change_b);
+    out.push_back(a.run == b.run && std::isfinite(covariance) ? covariance : 0.0);
+  }
+  return out;
+}
+
 }  // namespace
 
-Estimated pool(const std::vector<Estimated>& values, const std::string& name, bool& heterogeneous) {
+Estimated pool(const std::vector<Estimated>& values, const std::vector<double>& with_next,
+               const std::string& name, bool& heterogeneous) {
   heterogeneous = false;
   std::vector<const Estimated*> good;
-  for (const Estimated& v : values)
-    if (v.identifiable && v.std_error > 0) good.push_back(&v);
+  std::vector<double> covariance;  // of a good one with the next good one, where they are neighbours
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!values[i].identifiable || !(values[i].std_error > 0)) continue;
+    const bool neighbour = !good.empty() && good.back() + 1 == &values[i] && i - 1 < with_next.size();
+    if (!good.empty()) covariance.push_back(neighbour ? with_next[i - 1] : 0.0);
+    good.push_back(&values[i]);
+  }
   if (good.empty()) {
     Estimated none;
     none.name = name;
@@ -55,7 +74,10 @@ Estimated pool(const std::vector<Estimated>& values, const std::string& name, bo
   heterogeneous = chi_square_tail(q, k - 1) < kSignificant;
   if (!heterogeneous) {
     out.value = mean;
-    out.std_error = 1 / std::sqrt(w);
+    double variance = w;
+    for (std::size_t i = 0; i + 1 < good.size(); ++i)
+      variance += 2 * covariance[i] / std::pow(good[i]->std_error * good[i + 1]->std_error, 2);
+    out.std_error = std::sqrt(variance) / w;
     // The quantile of the surest step: pooling only adds degrees of freedom.
     const double half = std::clamp(least_half, 1.96, 12.71) * out.std_error;
     out.ci_low = mean - half;
@@ -95,9 +117,13 @@ void pool_steps(PcuFit& fit) {
       {"T_vent", "s", &PcuStep::lag, &vent},
       {"dead_time_vent", "s", &PcuStep::dead_time, &vent},
   };
+  const std::vector<double> shared = shared_levels(fit);
   for (const auto& want : wanted) {
     bool differ = false;
-    Estimated value = pool(collect(fit, want.member, want.direction), want.name, differ);
+    // Steps of one direction are no neighbours in a staircase that goes up and down; in one that climbs they are.
+    const bool shares = want.member == &PcuStep::gain && !want.direction;
+    Estimated value = pool(collect(fit, want.member, want.direction), shares ? shared : std::vector<double>(),
+                           want.name, differ);
     value.unit = want.unit;
     if (differ && want.direction)
       fit.warnings.push_back(

@@ -13,9 +13,9 @@
 namespace isac::estimate {
 
 /// Pools the identifiable ones; refused with the reason of the first when there is none. `heterogeneous` tells whether the
-/// values differ by more than their errors.
-[[nodiscard]] Estimated pool(const std::vector<Estimated>& values, const std::string& name,
-                             bool& heterogeneous);
+/// values differ by more than their errors. `with_next[i]` is the covariance of the values i and i + 1 (empty: none).
+[[nodiscard]] Estimated pool(const std::vector<Estimated>& values, const std::vector<double>& with_next,
+                             const std::string& name, bool& heterogeneous);
 
 /// Fills PcuFit::parameters, directions_differ and the warnings about differing steps.
 void pool_steps(PcuFit& fit);

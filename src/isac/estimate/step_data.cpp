@@ -107,7 +107,15 @@ StepData cut_step(const PcuRun& run, double step_time, double begin, double end,
   // The second difference of white noise has variance 6 σ².
   data.noise = kMadToSigma * median_of(std::move(second)) / std::sqrt(6.0);
   if (leave_out_spikes) remove_spikes(data);
+  data.reading = data.y;
   return data;
+}
+
+void remove_tail(StepData& data, double step_time, const Tail& tail) {
+  constexpr double kDiedOut = 40;  // lags: e⁻⁴⁰ is below the rounding of a pressure
+  if (data.s.empty() || step_time + data.s.front() - tail.onset > kDiedOut * tail.lag) return;
+  for (std::size_t i = 0; i < data.y.size(); ++i)
+    data.y[i] += tail.size * std::exp(-(step_time + data.s[i] - tail.onset) / tail.lag);
 }
 
 }  // namespace isac::estimate

@@ -27,11 +27,12 @@ struct CommandStep {
 
 /// Rows of one step's answer: time relative to the step, spikes and missing rows already left out.
 struct StepData {
-  std::vector<double> s;   ///< s behind the step
-  std::vector<double> y;   ///< Pa
-  double sample_time = 0;  ///< s, median
-  double quantum = 0;      ///< Pa, smallest change between rows
-  double noise = 0;        ///< Pa, standard deviation from second differences
+  std::vector<double> s;        ///< s behind the step
+  std::vector<double> y;        ///< Pa, what is fitted: the reading less what an earlier step has left over
+  std::vector<double> reading;  ///< Pa, as recorded
+  double sample_time = 0;       ///< s, median
+  double quantum = 0;           ///< Pa, smallest change between rows
+  double noise = 0;             ///< Pa, standard deviation from second differences
   std::size_t spikes = 0;
 };
 
@@ -39,6 +40,16 @@ struct StepData {
 /// robust standard deviations; a monotone rise never does, however steep.
 [[nodiscard]] StepData cut_step(const PcuRun& run, double step_time, double begin, double end,
                                 bool leave_out_spikes);
+
+/// An earlier step that has not died out: its pressure still to come at time t is −size e^(−(t − onset)/lag).
+struct Tail {
+  double size = 0;   ///< Pa
+  double lag = 1;    ///< s
+  double onset = 0;  ///< s, in the recording's time
+};
+
+/// Takes the tail off `y`. Exact where both steps have the same lag; else the error is the tail times the lags' difference.
+void remove_tail(StepData& data, double step_time, const Tail& tail);
 
 [[nodiscard]] double median_of(std::vector<double> values);
 

@@ -28,11 +28,11 @@ std::vector<double> modelled_autocovariance(std::span<const double> residuals) {
   }
   if (!(gamma[0] > 0)) return {0.0};
 
-  // Levinson–Durbin; the order with the least BIC.
+  // Levinson–Durbin; the order with the least AIC (BIC takes too few for noise that a quantum has whitened).
   std::vector<double> phi, best_phi;
   double variance = gamma[0];
-  double best_bic = std::log(variance);
-  const double penalty = std::log(static_cast<double>(n)) / static_cast<double>(n);
+  double best_aic = std::log(variance);
+  const double penalty = 2 / static_cast<double>(n);
   for (std::size_t k = 1; k <= max_order; ++k) {
     double reflection = gamma[k];
     for (std::size_t j = 1; j < k; ++j) reflection -= phi[j - 1] * gamma[k - j];
@@ -43,9 +43,9 @@ std::vector<double> modelled_autocovariance(std::span<const double> residuals) {
     phi = std::move(next);
     variance *= 1 - reflection * reflection;
     if (!(variance > 0)) break;
-    const double bic = std::log(variance) + penalty * static_cast<double>(k);
-    if (bic < best_bic) {
-      best_bic = bic;
+    const double aic = std::log(variance) + penalty * static_cast<double>(k);
+    if (aic < best_aic) {
+      best_aic = aic;
       best_phi = phi;
     }
   }
@@ -72,11 +72,11 @@ constexpr std::size_t kRestingRows = 8;
 
 Eigen::Matrix4d quantisation_meat(std::span<const double> jacobian, const StepData& data) {
   Eigen::Matrix4d meat = Eigen::Matrix4d::Zero();
-  const std::size_t n = data.y.size();
+  const std::size_t n = data.reading.size();
   std::size_t begin = 0;
   while (begin < n) {
     std::size_t end = begin + 1;
-    while (end < n && data.y[end] == data.y[begin]) ++end;
+    while (end < n && data.reading[end] == data.reading[begin]) ++end;
     if (end - begin >= kRestingRows) {
       Eigen::Vector4d sum = Eigen::Vector4d::Zero();
       for (std::size_t i = begin; i < end; ++i) sum += Eigen::Map<const Eigen::Vector4d>(&jacobian[4 * i]);

@@ -13,7 +13,7 @@
 
 namespace isac::estimate {
 
-/// Autocovariance γ_0, γ_1, … of a zero-mean stationary sequence by an autoregression (order by BIC, at most 12), up to the lag
+/// Autocovariance γ_0, γ_1, … of a zero-mean stationary sequence by an autoregression (order by AIC, at most 12), up to the lag
 /// where it has died out. White noise gives one element.
 [[nodiscard]] std::vector<double> modelled_autocovariance(std::span<const double> residuals);
 

@@ -30,8 +30,9 @@ Prefix prefix_sums(const std::vector<double>& y) {
 
 // Best L and levels for one T. Rows i ≥ m lie behind the onset; with e_i = exp(−(s_i − s_m)/T) the sums
 // A = Σ e, AA = Σ e², AY = Σ e y follow from those of m + 1 by one decay factor.
+// Onsets are tried within [earliest, latest].
 Candidate best_for_lag(std::span<const double> s, std::span<const double> y, const Prefix& prefix, double lag,
-                       double earliest, double weight) {
+                       double earliest, double latest, double weight) {
   Candidate best;
   const std::size_t n = s.size();
   const double total = prefix.sum[n], total_square = prefix.square[n];
@@ -51,7 +52,7 @@ Candidate best_for_lag(std::span<const double> s, std::span<const double> y, con
     a += 1;
     aa += 1;
     ay += y[m];
-    if (n - m < 3) continue;
+    if (n - m < 3 || s[m - 1] > latest) continue;
     if (s[m] < earliest) break;
     const double behind = static_cast<double>(n - m), before = static_cast<double>(m);
     const double sy = total - prefix.sum[m];
@@ -116,20 +117,24 @@ std::pair<StepParameters, double> search_step(const StepData& data, double earli
   const double longest = 3 * span;
   constexpr int kGrid = 48;
   const double ratio = std::pow(longest / shortest, 1.0 / (kGrid - 1));
-  double best_lag = shortest, best_sse = kInfinity;
+  double best_lag = shortest, best_sse = kInfinity, best_onset = 0;
   double lag = shortest;
   for (int k = 0; k < kGrid; ++k, lag *= ratio) {
-    const double sse = best_for_lag(sc, yc, coarse, lag, earliest, static_cast<double>(block)).sse;
-    if (sse < best_sse) {
-      best_sse = sse;
+    const Candidate c = best_for_lag(sc, yc, coarse, lag, earliest, kInfinity, static_cast<double>(block));
+    if (c.sse < best_sse) {
+      best_sse = c.sse;
       best_lag = lag;
+      best_onset = c.parameters[3];
     }
   }
 
   // Fine: golden section in ln T over the neighbouring grid points, all rows.
+  // The onset moves by less than a lag while T moves by one grid point.
   const Prefix fine = prefix_sums(y);
+  const double margin = 2 * best_lag + 3 * static_cast<double>(block) * data.sample_time;
+  const double from = std::max(earliest, best_onset - margin), to = best_onset + margin;
   const auto at = [&](double log_lag) {
-    return best_for_lag(data.s, y, fine, std::exp(log_lag), earliest, 1.0);
+    return best_for_lag(data.s, y, fine, std::exp(log_lag), from, to, 1.0);
   };
   const double golden = 0.5 * (std::sqrt(5.0) - 1);
   double low = std::log(best_lag / ratio), high = std::log(best_lag * ratio);

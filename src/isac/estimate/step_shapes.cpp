@@ -217,15 +217,17 @@ StepShapeFit fit_shape(StepShape kind, const StepData& data, const StepFit& firs
 
 namespace {
 
+constexpr double kSwing = 0.03;  // of the step: more than a sensor's noise, a limit cycle
+
 struct BlockMeans {
   std::vector<double> moving, moving_at, resting, rows;
 };
 
-// Means of the residual over an eighth of the lag, while the pressure moves and at rest.
+// Means of the residual over a sixteenth of the lag, while the pressure moves and at rest.
 BlockMeans block_means(const StepData& data, const StepFit& fit) {
   BlockMeans out;
   const double lag = fit.parameters[2], onset = fit.parameters[3];
-  const double width = std::max(lag / 8, data.sample_time);
+  const double width = std::max(lag / 16, data.sample_time);
   std::size_t i = 0;
   while (i < data.s.size()) {
     const double begin = data.s[i];
@@ -318,12 +320,17 @@ StepAdequacy judge_step(const StepData& data, const StepFit& fit, double earlies
     out.p_value = boost::math::cdf(
         boost::math::complement(boost::math::fisher_f(dof, rest_count), moving / (rest * rest)));
   out.first_order = out.misfit_worst <= tolerance;
+  const std::string swing =
+      rest > kSwing * size
+          ? fmt::format("; at rest the pressure still swings by {:.0f} % rms of the step", 100 * rest / size)
+          : std::string();
 
   out.shapes.push_back(fit_shape(StepShape::kFirstOrder, data, fit, earliest));
   const bool clean = out.misfit_worst < 0.01 || out.p_value > 0.001;
   if (out.first_order && clean) {
-    out.sentence =
-        fmt::format("first order: the largest smooth misfit is {:.2g} % of the step", 100 * out.misfit_worst);
+    out.sentence = fmt::format("first order: the largest smooth misfit is {:.2g} % of the step",
+                               100 * out.misfit_worst) +
+                   swing;
     return out;
   }
   for (const StepShape s : {StepShape::kSecondOrder, StepShape::kFlowLimited, StepShape::kTwoRates})
@@ -340,6 +347,7 @@ StepAdequacy judge_step(const StepData& data, const StepFit& fit, double earlies
     out.sentence = fmt::format(
         "first order to within {:.1f} % of the step; closer still ({:.3g} against {:.3g} Pa rms): {}",
         100 * out.misfit_worst, best.rmse, out.shapes.front().rmse, shape_words(best, filling));
+  out.sentence += swing;
   return out;
 }
 
