@@ -16,7 +16,7 @@ fi
 rm -rf "$out"
 mkdir -p "$out"
 : > "$out/.isac-demo"
-cp "$here/data/testbed/rig.toml" "$out/rig.toml"
+cp "$here/data/rigs/testbed.toml" "$out/rig.toml"
 
 say "1 of 5  Logging the sweeps of a testbed (simulated rig, virtual time)"
 "$programs/isac-log" all --card sim:seed=2003 --rig "$out/rig.toml" -o "$out/dataset"

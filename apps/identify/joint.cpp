@@ -17,7 +17,7 @@
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/joint_fit.hpp"
-#include "isac/models/effects.hpp"
+#include "isac/models/effect_queries.hpp"
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"
 #include "isac/record/model_file.hpp"
@@ -89,6 +89,17 @@ bool uses_pressure(const std::vector<std::string>& terms) {
     if (effect < 0) return false;  // the fit itself names unknown terms
     return models::effect_uses_pressure(effect);
   });
+}
+
+/// Equations of the terms beyond the seed's four, for the report.
+std::vector<report::TermText> texts_of(const std::vector<std::string>& terms) {
+  std::vector<report::TermText> texts;
+  for (const std::string& term : terms) {
+    const int effect = models::find_effect(term);
+    if (effect < 0 || term.size() == 1) continue;
+    texts.push_back({term, models::effect_catalogue()[static_cast<std::size_t>(effect)].equation});
+  }
+  return texts;
 }
 
 record::Params params_of(const estimate::JointFit& fit, const record::Rig& rig,
@@ -179,7 +190,8 @@ int run_joint(const Call& call, const std::string& json_path) {
   options.differentiator = parse_differentiator(call.differentiator);
   options.block_seconds = call.block_seconds;
   options.errors_in_variables = !call.plain_regressors;
-  options.weights_from_noise = !call.plain_regressors;
+  options.effective_variance = !call.plain_regressors;
+  options.parallel_filter = !call.plain_regressors;
   signals.needs_pressure = uses_pressure(options.terms);
 
   const Files files = find_files(call.runs, call.heldout, call.rig);
@@ -232,11 +244,14 @@ int run_joint(const Call& call, const std::string& json_path) {
 
   if (!call.report.empty()) {
     report::JointReportInput input;
-    input.title = rig.name.empty() ? "Joint" : "Joint " + rig.name;
+    input.title = rig.name.empty() ? "Joint identification" : "Joint identification: " + rig.name;
     input.fit = &fit;
     input.runs = runs;
     input.heldout = heldout;
-    input.options = &options;
+    input.rig = rig.name;
+    input.created = now_iso8601();
+    input.options = options;
+    input.terms = texts_of(options.terms);
     record::write_atomically(call.report, report::render_joint_report(input));
   }
   if (!call.params.empty())
