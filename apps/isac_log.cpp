@@ -29,7 +29,7 @@ struct Words {
   std::string duration, hold, amplitude, speed, base;
   std::string delta_pressures, angles, heights;
   std::string limit_pressure, limit_delta_pressure, limit_angle, limit_speed, limit_force;
-  double rate = std::numeric_limits<double>::quiet_NaN();
+  double rate = 500;
   std::uint64_t seed = 1;
   bool slow = false, fast = false, raw = false, overwrite = false, yes = false;
 };
@@ -42,6 +42,7 @@ std::vector<double> parse_list(const std::string& text, const Dimension& wanted,
   const char* last = text.c_str() + (comma == std::string::npos ? 0 : comma + 1);
   char* unit = nullptr;
   static_cast<void>(std::strtod(last, &unit));
+  if (unit == last) return {apps::parse_quantity(text, wanted, option)};  // no number there: says so
   for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 1) {
     end = text.find(',', begin);
     const std::string one =
@@ -63,7 +64,12 @@ double parse_or(const std::string& text, double fallback, const Dimension& wante
   return text.empty() ? fallback : apps::parse_quantity(text, wanted, option);
 }
 
-runtime::SessionOptions session_of(const Words& words, bool seed_given) {
+/// Options whose default depends on whether they were given.
+struct Given {
+  bool rate = false, seed = false;
+};
+
+runtime::SessionOptions session_of(const Words& words, const Given& given) {
   runtime::SessionOptions session;
   session.rig = record::read_rig(words.rig);
   session.rig_file = words.rig;
@@ -72,12 +78,11 @@ runtime::SessionOptions session_of(const Words& words, bool seed_given) {
     session.rig.joint.initial_pressure = 3.0 * kPascalPerKgfCm2;
   const record::Rig& rig = session.rig;
   session.card = !words.card.empty() ? words.card : !rig.card.device.empty() ? rig.card.device : "sim:";
-  if (seed_given && session.card.rfind("sim:", 0) == 0 && session.card.find("seed=") == std::string::npos) {
+  if (given.seed && session.card.rfind("sim:", 0) == 0 && session.card.find("seed=") == std::string::npos) {
     session.card += (session.card.size() > 4 ? ",seed=" : "seed=") + std::to_string(words.seed);
   }
-  session.rate = !std::isnan(words.rate)               ? words.rate
-                 : std::isfinite(rig.card.sample_rate) ? rig.card.sample_rate
-                                                       : 500.0;
+  const bool rig_rate = !given.rate && std::isfinite(rig.card.sample_rate);
+  session.rate = rig_rate ? rig.card.sample_rate : words.rate;
   session.dataset = words.experiment == "all" || words.experiment == "testbed-bundle";
   session.pace_real = words.pace == "real";
   session.raw = words.raw;
@@ -188,8 +193,8 @@ class Console : public runtime::SessionObserver {
   int last_line_ = -1;
 };
 
-int log_sweeps(const Words& words, bool seed_given) {
-  const runtime::SessionOptions session = session_of(words, seed_given);
+int log_sweeps(const Words& words, const Given& given) {
+  const runtime::SessionOptions session = session_of(words, given);
   apps::require_writable(words.json);
   const runtime::StopSignals signals;
   std::FILE* out = words.json == "-" ? stderr : stdout;  // standard output then belongs to the answer
@@ -231,7 +236,8 @@ int main(int argc, char** argv) {
                  "The card, e.g. sim: or replay:FILE (default: the rig file's, else sim:)");
   app.add_option("--rig", words.rig, "The rig file, rig.toml")->required();
   app.add_option("-o,--output", words.folder, "Folder for the recordings; made if missing")->required();
-  app.add_option("--rate", words.rate, "Samples per second (default: the rig file's, else 500)");
+  CLI::Option* rate =
+      app.add_option("--rate", words.rate, "Samples per second (default: the rig file's, else 500)");
   CLI::Option* seed =
       app.add_option("--seed", words.seed, "Seed of the excitation, and of sim: where it names none");
   app.add_flag("--raw", words.raw, "Log the card's counts too (enc, ai, ao)");
@@ -267,5 +273,7 @@ int main(int argc, char** argv) {
   app.add_option("--limit-force", words.limit_force, "Of either muscle")
       ->group("Safety limits (default: the rig file's)");
   app.footer(experiments_help);
-  return apps::run_program(app, argc, argv, words.json, [&] { return log_sweeps(words, seed->count() > 0); });
+  return apps::run_program(app, argc, argv, words.json, [&] {
+    return log_sweeps(words, {.rate = rate->count() > 0, .seed = seed->count() > 0});
+  });
 }

@@ -181,6 +181,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"constant-pressure", [](ExcitationOptions& o) { o.amplitude = 1.3; }, "angle_beyond_limit"},
         Refusal{"constant-pressure", [](ExcitationOptions& o) { o.speed = 7.0; }, "speed_beyond_limit"},
         Refusal{"free", [](ExcitationOptions& o) { o.duration = -1.0; }, "not_positive"},
+        Refusal{"bundle", [](ExcitationOptions& o) { o.duration = 1e12; }, "too_long"},
         Refusal{"constant-angle", [](ExcitationOptions& o) { o.angles = {-1.2}; }, "angle_beyond_limit"},
         Refusal{"pcu-step", [](ExcitationOptions& o) { o.heights = {5.5 * kKgf}; }, "step_beyond_limit"},
         Refusal{"pcu-step", [](ExcitationOptions& o) { o.base_pressure = -1.0; }, "baseline_beyond_limit"},

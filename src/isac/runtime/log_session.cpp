@@ -72,7 +72,7 @@ void prepare_output(const SessionOptions& options) {
   }();
   std::error_code error;
   const fs::space_info space = fs::space(parent, error);
-  if (!error && static_cast<double>(space.available) < bytes) {
+  if (!error && space.capacity > 0 && static_cast<double>(space.available) < bytes) {
     refuse_output(
         "disk_full",
         fmt::format(

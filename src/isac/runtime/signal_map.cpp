@@ -28,6 +28,19 @@ SignalMap::SignalMap(const record::Rig& rig, const card::Shape& shape)
   if (shape.encoders < 1) {
     throw Error(ErrorKind::kStopped, "card_without_encoder", "the card has no encoder; choose another card");
   }
+  for (const record::RigChannel& channel : rig.calibration) {
+    if (channel.signal != "angle") continue;
+    const int number = channel_number(channel.channel, "enc", shape.encoders);
+    if (number < 0 || !std::isfinite(channel.gain) || channel.gain == 0.0) {
+      throw Error(ErrorKind::kBadInput, "calibration_channel",
+                  "the rig file puts angle on channel '" + channel.channel +
+                      "', which the card does not have or whose gain is no number; it has enc0 to enc" +
+                      std::to_string(shape.encoders - 1));
+    }
+    encoder_ = static_cast<std::size_t>(number);
+    radian_per_count_ = channel.gain;
+    middle_ = channel.offset;
+  }
   const std::vector<record::RigChannel> channels =
       rig.calibration.empty() ? card::default_calibration() : rig.calibration;
   struct Wanted {
@@ -70,11 +83,13 @@ SignalMap::SignalMap(const record::Rig& rig, const card::Shape& shape)
 Physical SignalMap::to_physical(const card::Sample& sample) noexcept {
   // Counters wrap at the modulus; half of it is farther than any joint turns between two samples.
   const auto modulus = static_cast<std::int64_t>(shape_.encoder_modulus);
-  const std::uint32_t count = sample.encoder[0];
+  const std::uint32_t count = sample.encoder[encoder_];
   if (!has_count_) {
     position_ = count;
-    if (position_ - middle_ > modulus / 2) position_ -= modulus;
-    if (position_ - middle_ < -modulus / 2) position_ += modulus;
+    const double from_middle = static_cast<double>(position_) - middle_,
+                 half = 0.5 * static_cast<double>(modulus);
+    if (from_middle > half) position_ -= modulus;
+    if (from_middle < -half) position_ += modulus;
     has_count_ = true;
   } else {
     std::int64_t moved = static_cast<std::int64_t>(count) - static_cast<std::int64_t>(last_count_);
@@ -86,7 +101,7 @@ Physical SignalMap::to_physical(const card::Sample& sample) noexcept {
   const auto input = [&sample](const Line& line) noexcept {
     return value(line, sample.input[static_cast<std::size_t>(line.channel)]);
   };
-  return {.angle = static_cast<double>(position_ - middle_) * radian_per_count_,
+  return {.angle = (static_cast<double>(position_) - middle_) * radian_per_count_,
           .p1 = input(p1_),
           .p2 = input(p2_),
           .F1 = input(F1_),

@@ -2,7 +2,8 @@
 /// What the card's codes mean: linear calibration of the rig file, encoder counts unwrapped to an angle, pressures to codes.
 ///
 ///   physical = (code − offset) · gain        angle = (count − middle) · 2π / steps_per_turn
-/// Signals known: F1, F2, p1, p2 (inputs), p1_cmd, p2_cmd (outputs), the joint's encoder is `enc0`.
+/// Signals known: F1, F2, p1, p2 (inputs), p1_cmd, p2_cmd (outputs), angle (an encoder; where the calibration has none,
+/// enc0 with the rig file's [encoder] section).
 ///
 /// Units: SI. Real time: to_physical and to_command allocate nothing, throw nothing, take constant time.
 /// Threads: one at a time (the encoder's unwrapping has a memory).
@@ -10,6 +11,8 @@
 /// Source: seed E.3 (calibration), E.1.4 and C.4 (cards), E.2.2 getEncoderData.
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -38,7 +41,7 @@ class SignalMap {
 
   /// What each sensor can show, for the sweep check.
   [[nodiscard]] const std::vector<series::SensorRange>& ranges() const noexcept { return ranges_; }
-  [[nodiscard]] double encoder_step() const noexcept { return radian_per_count_; }
+  [[nodiscard]] double encoder_step() const noexcept { return std::abs(radian_per_count_); }
   [[nodiscard]] const card::Shape& shape() const noexcept { return shape_; }
 
  private:
@@ -53,8 +56,9 @@ class SignalMap {
 
   card::Shape shape_;
   Line p1_, p2_, F1_, F2_, p1_cmd_, p2_cmd_;
+  std::size_t encoder_ = 0;
   double radian_per_count_;
-  std::int64_t middle_;
+  double middle_;  ///< count; a calibrated middle may lie between two
   std::int64_t position_ = 0;
   std::uint32_t last_count_ = 0;
   bool has_count_ = false;

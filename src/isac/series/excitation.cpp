@@ -12,6 +12,7 @@ namespace isac::series {
 namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / kPi;
+constexpr double kLongest = 86400.0;  // s
 
 std::string number(const char* format, double value) {
   std::array<char, 64> text{};
@@ -456,6 +457,11 @@ std::vector<Program> make_programs(std::string_view experiment, const Excitation
       known += (known.empty() ? "" : ", ") + std::string(info.name);
     refuse("experiment_unknown",
            "there is no experiment '" + std::string(experiment) + "'; choose one of " + known);
+  }
+  for (const Program& program : programs) {
+    if (program.duration <= kLongest) continue;
+    refuse("too_long", "a recording of " + number("%.6g", program.duration) + " s is longer than a day (" +
+                           number("%.0f", kLongest) + " s); ask for a shorter one");
   }
   for (std::size_t i = 0; i < programs.size(); ++i) {  // two levels that round to one file name
     for (std::size_t j = i + 1; j < programs.size(); ++j) {
