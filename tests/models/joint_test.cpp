@@ -46,7 +46,7 @@ TEST(JointTorque, refuses_a_pressure_where_pressure_has_no_say) {
 
 TEST(JointTorque, has_derivatives_that_are_its_coefficients) {
   using Jet = ceres::Jet<double, 4>;
-  const JointParameters<Jet> q{
+  const JointCoefficients<Jet> q{
       .A = Jet(-23450.0, 0), .B = Jet(1.8e-3, 1), .C = Jet(0.0026, 2), .D = Jet(0.14, 3)};
   const Jet t = joint_torque(q, Jet(kR), Jet(0.4), Jet(1e5), Jet(-2.0));
   EXPECT_NEAR(t.v[0], kR * kR * 0.4, 1e-15);
@@ -111,7 +111,7 @@ TEST(SecondOrder, oscillates_as_the_equation_of_motion_says) {
   ASSERT_EQ(second_order(q, kR, inertia, joint), Status::kOk);
   // T_J² φ̈ + 2 ζ T_J φ̇ + φ = K_J Δp, at any state, is I φ̈ = T without the cubic part.
   const double phi = 0.3, omega = -1.1, dp = 0.7e5;
-  JointParameters<double> linear = q;
+  JointCoefficients<double> linear = q;
   linear.C = 0;
   const double acceleration = joint_acceleration(inertia, joint_torque(linear, kR, phi, dp, omega), 0.0);
   EXPECT_NEAR(joint.time_constant * joint.time_constant * acceleration +

@@ -33,7 +33,7 @@ struct SecondOrder {
 };
 
 template <class S>
-[[nodiscard]] Status second_order(const JointParameters<S>& q, const S& wheel_radius, const S& inertia,
+[[nodiscard]] Status second_order(const JointCoefficients<S>& q, const S& wheel_radius, const S& inertia,
                                   SecondOrder<S>& out) noexcept {
   using std::sqrt;
   const S stiffness = -(q.A * wheel_radius * wheel_radius);

@@ -20,7 +20,7 @@
 namespace isac::models {
 
 template <class S>
-struct JointParameters {
+struct JointCoefficients {
   S A{};  ///< N/m
   S B{};  ///< N/Pa
   S C{};  ///< N m s³
@@ -41,7 +41,7 @@ template <class S>
 
 /// The seed's testbed (3.3): A = −23450 N/m, B = 174.2 N cm²/kg, C = 0.0026 N m s³, D = 0.14 N m s.
 template <class S>
-[[nodiscard]] constexpr JointParameters<S> testbed_parameters() noexcept {
+[[nodiscard]] constexpr JointCoefficients<S> testbed_parameters() noexcept {
   return {.A = S(-23450.0), .B = pressure_gain_from_reported(S(174.2)), .C = S(0.0026), .D = S(0.14)};
 }
 
@@ -49,7 +49,7 @@ template <class S>
 inline constexpr double kTestbedWheelRadius = 0.019;
 
 template <class S>
-[[nodiscard]] constexpr S joint_torque(const JointParameters<S>& q, const S& wheel_radius, const S& angle,
+[[nodiscard]] constexpr S joint_torque(const JointCoefficients<S>& q, const S& wheel_radius, const S& angle,
                                        const S& delta_pressure, const S& velocity) noexcept {
   const S r = wheel_radius;
   return q.A * r * r * angle + q.B * r * delta_pressure - q.C * velocity * velocity * velocity -
@@ -58,7 +58,7 @@ template <class S>
 
 /// The Δp that gives `torque`; `delta_pressure` is untouched unless the status is ok.
 template <class S>
-[[nodiscard]] Status delta_pressure_for_torque(const JointParameters<S>& q, const S& wheel_radius,
+[[nodiscard]] Status delta_pressure_for_torque(const JointCoefficients<S>& q, const S& wheel_radius,
                                                const S& torque, const S& angle, const S& velocity,
                                                S& delta_pressure) noexcept {
   const S gain = q.B * wheel_radius;

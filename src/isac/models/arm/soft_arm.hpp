@@ -104,7 +104,7 @@ template <class S>
 [[nodiscard]] S wrap_to_pi(const S& angle) noexcept {
   using std::floor;
   constexpr double kPiExact = 3.14159265358979323846;
-  const S turn(2 * kPiExact);
+  const S turn = S(2 * kPiExact);
   return angle - turn * floor((angle + S(kPiExact)) / turn);
 }
 
@@ -131,7 +131,7 @@ template <class S>
   const S across2 = px * px + py * py - g.l2 * g.l2;  // squared distance along the arm's plane
   const S reach2 = across2 + h * h;
   const S s3 = (g.l3 * g.l3 + g.l4 * g.l4 - reach2) / (S(2) * g.l3 * g.l4);  // 4.22
-  const S slack(1e-9);  // rounding at the border of the workspace is not "unreachable"
+  const S slack = S(1e-9);  // rounding at the border of the workspace is not "unreachable"
   if (across2 < -slack) {
     result.reach = Reach::kInsideShoulder;
     return result;
