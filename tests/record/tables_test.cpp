@@ -9,7 +9,9 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <random>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -138,6 +140,17 @@ TEST(Tables, binary_gives_the_same_table_back) {
   models::ParameterTable back;
   ASSERT_EQ(models::load_parameter_table(tables.binary, back), Status::kOk);
   EXPECT_EQ(back, parameter_table(arm()));
+}
+
+TEST(Tables, a_binary_of_version_1_written_once_is_read_for_ever) {
+  const std::filesystem::path folder = std::filesystem::path(ISAC_SOURCE_DIR) / "fixtures/params";
+  std::ifstream stream(folder / "testbed.bin", std::ios::binary);
+  const std::string text((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  models::ParameterTable stored;
+  ASSERT_EQ(models::load_parameter_table(std::as_bytes(std::span(text)), stored), Status::kOk);
+  EXPECT_EQ(stored, parameter_table(read_params(folder / "testbed.toml")));
+  EXPECT_EQ(stored.joints[0][JointField::kA], -23450);
+  EXPECT_EQ(stored.joints[0][JointField::kWheelRadius], 0.019);
 }
 
 TEST(Tables, terms_under_their_catalogue_names_reach_their_places) {

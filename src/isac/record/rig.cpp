@@ -19,7 +19,7 @@ void read_into(const TomlSection& section, std::string_view key, const Dimension
                double& target, double factor = 1) {
   const auto value = section.quantity(key, dimension);
   if (!value) return;
-  if (*value < 0 || (sign == Sign::kPositive && *value == 0)) {
+  if (*value < 0 || (sign == Sign::kPositive && *value * factor == 0)) {
     section.fail(key, "value_out_of_range",
                  "'" + std::string(key) + "' is " + shown(*section.raw().get(key)) + "; it must be " +
                      (sign == Sign::kPositive ? "greater than zero" : "zero or more"));

@@ -19,6 +19,24 @@ Place place_of(const toml::source_region& region, const std::string& file) {
   return {file, static_cast<long>(region.begin.line), static_cast<long>(region.begin.column)};
 }
 
+constexpr std::size_t kLongestWord = 60, kLongestSentence = 600;
+
+/// One line of bounded length, whatever the file's keys and values hold.
+std::string one_line(std::string text, std::size_t longest) {
+  for (char& letter : text) {
+    if (static_cast<unsigned char>(letter) < 0x20 || letter == 0x7F) letter = ' ';
+  }
+  if (text.size() <= longest) return text;
+  std::size_t end = longest;  // not in the middle of a UTF-8 letter
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0u) == 0x80u) --end;
+  return text.substr(0, end) + "…";
+}
+
+[[noreturn]] void throw_bad_input(std::string code, std::string text, Place place) {
+  throw Error(ErrorKind::kBadInput, std::move(code), one_line(std::move(text), kLongestSentence),
+              std::move(place));
+}
+
 /// Skips a TOML string that begins at `at`; returns the position behind it.
 std::size_t skip_string(const std::string& text, std::size_t at, long& line) {
   const char quote = text[at];
@@ -59,10 +77,11 @@ void refuse_deep_nesting(const std::string& text, const std::string& file) {
     if (letter == '[' || letter == '{') ++brackets;
     if (letter == ']' || letter == '}') brackets = std::max(0, brackets - 1);
     if (dots > kMaxDots || brackets > kMaxBrackets) {
-      throw Error(ErrorKind::kBadInput, "nested_too_deeply",
-                  "keys or brackets are nested too deeply to be meant; keep to " + std::to_string(kMaxDots) +
-                      " names in a key and " + std::to_string(kMaxBrackets) + " open brackets",
-                  {file, line, 0});
+      throw_bad_input("nested_too_deeply",
+                      "keys or brackets are nested too deeply to be meant; keep to " +
+                          std::to_string(kMaxDots) + " names in a key and " + std::to_string(kMaxBrackets) +
+                          " open brackets",
+                      {file, line, 0});
     }
     ++at;
   }
@@ -99,19 +118,19 @@ toml::table parse_toml(const std::string& text, const std::string& file) {
   try {
     return toml::parse(std::string_view(text), std::string_view(file));
   } catch (const toml::parse_error& error) {
-    throw Error(
-        ErrorKind::kBadInput, "toml_syntax",
+    throw_bad_input(
+        "toml_syntax",
         "is not valid TOML: " + std::string(error.description()) + "; mend this line, or write the file anew",
         place_of(error.source(), file));
   }
 }
 
 void fail_at(const toml::node& node, const std::string& file, std::string code, std::string text) {
-  throw Error(ErrorKind::kBadInput, std::move(code), std::move(text), place_of(node.source(), file));
+  throw_bad_input(std::move(code), std::move(text), place_of(node.source(), file));
 }
 
 std::string shown(const toml::node& node) {
-  if (const auto* value = node.as_string()) return toml_string(value->get());
+  if (const auto* value = node.as_string()) return toml_string(one_line(value->get(), kLongestWord));
   if (const auto* value = node.as_integer()) return std::to_string(value->get());
   if (const auto* value = node.as_floating_point()) return exact_number(value->get());
   if (const auto* value = node.as_boolean()) return value->get() ? "true" : "false";
@@ -126,10 +145,11 @@ TomlSection::TomlSection(const toml::table& table, std::string name, const std::
   for (const auto& [key, node] : table) {
     if (std::ranges::find(known, key.str()) != known.end()) continue;
     const std::string nearest = nearest_word(key.str(), known);
-    throw Error(ErrorKind::kBadInput, "unknown_key",
-                "'" + std::string(key.str()) + "' is not a key of " + where() + "; " +
-                    (nearest.empty() ? "it knows " + join_quoted(known) : "did you mean '" + nearest + "'?"),
-                place_of(key.source(), file));
+    throw_bad_input(
+        "unknown_key",
+        "'" + one_line(std::string(key.str()), kLongestWord) + "' is not a key of " + where() + "; " +
+            (nearest.empty() ? "it knows " + join_quoted(known) : "did you mean '" + nearest + "'?"),
+        place_of(key.source(), file));
   }
 }
 

@@ -46,7 +46,9 @@ template <typename Words>
 
 template <typename Words>
 std::string nearest_word(std::string_view word, const Words& known) {
+  constexpr std::size_t kLongestMistake = 64;  // a longer word is no misspelling, and would cost time
   std::string best;
+  if (word.size() > kLongestMistake) return best;
   std::size_t least =
       word.size() / 3 + 2;  // a third of the letters wrong is still a typing error, more is another word
   for (const auto& candidate : known) {
