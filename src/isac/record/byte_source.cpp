@@ -15,6 +15,8 @@
 namespace isac::record {
 namespace {
 
+constexpr std::uint64_t kHashAsideFrom = std::uint64_t{4} << 20U;
+
 [[noreturn]] void refuse(const std::string& file, int error) {
   const Place place{file, 0, 0};
   if (error == ENOENT || error == ENOTDIR) {
@@ -50,6 +52,10 @@ ByteSource ByteSource::open(const std::filesystem::path& path, bool hash, std::s
   if (S_ISREG(status.st_mode)) {
     source.size_ = static_cast<std::uint64_t>(status.st_size);
     ::posix_fadvise(source.descriptor_, 0, 0, POSIX_FADV_SEQUENTIAL);  // advice: failing costs nothing
+    if (hash && source.size_ >= kHashAsideFrom) {
+      source.hash_.reset();
+      source.file_hasher_ = std::make_unique<FileHasher>(source.descriptor_, source.size_);
+    }
   }
   return source;
 }
@@ -62,6 +68,7 @@ ByteSource ByteSource::of_memory(std::string_view bytes, std::string name, bool 
 }
 
 ByteSource::~ByteSource() {
+  file_hasher_.reset();  // before the descriptor that it reads from
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
@@ -75,7 +82,8 @@ ByteSource::ByteSource(ByteSource&& other) noexcept
       end_(other.end_),
       bytes_read_(other.bytes_read_),
       size_(other.size_),
-      hash_(std::move(other.hash_)) {}
+      hash_(std::move(other.hash_)),
+      file_hasher_(std::move(other.file_hasher_)) {}
 
 std::size_t ByteSource::read_piece(char* to) {
   if (descriptor_ < 0) {
@@ -84,8 +92,11 @@ std::size_t ByteSource::read_piece(char* to) {
     memory_.remove_prefix(count);
     return count;
   }
+  // Pipes and files that do not know their size (/proc) are read to their end.
+  const std::uint64_t left = size_ > 0 ? size_ - bytes_read_ : piece_;
+  const std::size_t wanted = static_cast<std::size_t>(std::min<std::uint64_t>(piece_, left));
   for (;;) {
-    const ssize_t count = ::read(descriptor_, to, piece_);
+    const ssize_t count = ::read(descriptor_, to, wanted);
     if (count >= 0) return static_cast<std::size_t>(count);
     if (errno != EINTR) refuse(name_, errno);
   }
@@ -112,6 +123,7 @@ void ByteSource::terminate() noexcept {
 }
 
 std::string ByteSource::sha256() {
+  if (file_hasher_) return std::exchange(file_hasher_, nullptr)->finish(name_);
   return hash_ ? std::exchange(hash_, std::nullopt)->finish() : std::string();
 }
 

@@ -3,17 +3,21 @@
 ///
 /// The window [begin, end) holds what was read and not yet consumed; kPadding readable bytes stand behind `end`, so that a
 /// parser may load eight bytes at once anywhere in the window. Memory is bounded by the longest unconsumed stretch plus one
-/// piece. Throws isac::Error (bad input) with codes file_missing, file_is_directory, file_unreadable. Threads: one per object.
+/// piece. A file is read as far as it reached when it was opened, so that a log may go on growing; files from 4 MB on are hashed
+/// on a second thread. Throws isac::Error (bad input) with codes file_missing, file_is_directory, file_unreadable,
+/// file_changed. Threads: one per object.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "isac/record/file_hasher.hpp"
 #include "isac/record/sha256.hpp"
 
 namespace isac::record {
@@ -66,7 +70,8 @@ class ByteSource {
   std::size_t end_ = 0;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t size_ = 0;
-  std::optional<Sha256> hash_;
+  std::optional<Sha256> hash_;               ///< of small files and of memory
+  std::unique_ptr<FileHasher> file_hasher_;  ///< of large files
 };
 
 }  // namespace isac::record
