@@ -19,12 +19,13 @@ namespace isac::report {
 
 namespace colour {
 inline constexpr const char* kMeasured = "#4d4d4d";
-inline constexpr const char* kModel = "#d55e00";   // vermilion
-inline constexpr const char* kSecond = "#0072b2";  // blue
-inline constexpr const char* kThird = "#009e73";   // green
-inline constexpr const char* kFourth = "#cc79a7";  // purple
-inline constexpr const char* kFifth = "#56b4e9";   // sky
-inline constexpr const char* kSixth = "#e69f00";   // orange
+inline constexpr const char* kUnderlay = "#a3a3a3";  // measured, wide, under a thin model
+inline constexpr const char* kModel = "#d55e00";     // vermilion
+inline constexpr const char* kSecond = "#0072b2";    // blue
+inline constexpr const char* kThird = "#009e73";     // green
+inline constexpr const char* kFourth = "#cc79a7";    // purple
+inline constexpr const char* kFifth = "#56b4e9";     // sky
+inline constexpr const char* kSixth = "#e69f00";     // orange
 inline constexpr const char* kReference = "#8a8a8a";
 inline constexpr const char* kBox = "#009e73";
 /// The k-th colour of a set without order; repeats after seven.

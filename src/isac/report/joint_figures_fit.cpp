@@ -112,7 +112,7 @@ Figure torque_sensor_figure(const JointView& view) {
                 .panel_height = 170,
                 .shared_x = true};
   Panel both{.x = view.time, .y = view.output};
-  Curve measured = line("measured", colour::kMeasured, part(rows.time, window), part(rows.measured, window));
+  Curve measured = line("measured", colour::kUnderlay, part(rows.time, window), part(rows.measured, window));
   measured.size = 2.6;
   Curve model = line("model", colour::kModel, part(rows.time, window), part(rows.predicted, window));
   model.size = 1.1;
@@ -160,7 +160,7 @@ MaybeFigure static_figure(const JointView& view) {
           run.name + ". The static model errs by the half width of the hysteresis.",
       .panel_height = 210};
   Panel panel{.x = view.time, .y = view.output};
-  Curve measured = line("measured", colour::kMeasured, part(rows.time, window), part(rows.measured, window));
+  Curve measured = line("measured", colour::kUnderlay, part(rows.time, window), part(rows.measured, window));
   measured.size = 2.6;
   Curve plain = line("static model", colour::kSecond, part(rows.time, window), part(still, window));
   plain.dash = Dash::kDashed;

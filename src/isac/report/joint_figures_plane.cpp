@@ -61,7 +61,7 @@ Panel loop_panel(const JointView& view, const std::string& title, const RunView&
     const auto part = [&](const std::vector<double>& v) {
       return std::span(v).subspan(window.first, window.last - window.first);
     };
-    Curve measured = loop("measured", colour::kMeasured, part(rows.angle), part(rows.measured));
+    Curve measured = loop("measured", colour::kUnderlay, part(rows.angle), part(rows.measured));
     measured.size = measured.mark == Mark::kLine ? 2.4 : measured.size;
     panel.curves = {std::move(measured),
                     loop("model", colour::kModel, part(rows.angle), part(rows.predicted))};
@@ -164,7 +164,7 @@ MaybeFigure bundle_figure(const JointView& view) {
       collect(view, true, [](const RunView& run, std::size_t) { return run.constant_pressure; });
   if (rows.angle.size() < 2) return {.missing = name + ": no run at constant pressure"};
   Figure figure{.caption = "Bundle: " + lower_first(view.output.label) +
-                           " less its pressure part B r Δp over " + view.angle.label +
+                           " less its pressure part B r Δp over " + lower_first(view.angle.label) +
                            ", all runs at constant pressure. Dashed: A r² φ.",
                 .panel_height = 260};
   Panel panel{.x = view.angle, .y = view.output};

@@ -50,7 +50,7 @@ Figure signals_figure(const JointView& view, const RunView& run) {
   figure.panels = {std::move(angle), std::move(velocity)};
   if (view.has_pressure) figure.panels.push_back(pressure_panel(view, run));
   Panel output{.x = view.time, .y = view.output};
-  output.curves.push_back(line("measured", colour::kMeasured, rows.time, rows.measured));
+  output.curves.push_back(line("measured", colour::kUnderlay, rows.time, rows.measured));
   output.curves.back().size = 2.4;
   Curve model = line("model", colour::kModel, rows.time, rows.predicted);
   model.size = 1.1;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/report/report_head.hpp"
 #include "isac/report/text.hpp"
 
 namespace isac::report {
@@ -70,11 +70,7 @@ JointView make_joint_view(const JointReportInput& input) {
   JointView view;
   view.input = &input;
   view.fit = input.fit;
-  const auto pressure = parse_unit(input.pressure_unit);
-  if (!pressure || !(pressure->dimension == dimension::kPressure))
-    throw Error(ErrorKind::kUsage, "unit_wrong",
-                "\"" + input.pressure_unit + "\" is not a unit of pressure; use kg/cm2, bar, kPa or Pa");
-  view.pressure_scale = 1 / pressure->scale;
+  view.pressure_scale = pressure_per_pascal(input.pressure_unit);
   view.pressure_unit = input.pressure_unit;
 
   const bool linear = input.options.position_unit == "m";

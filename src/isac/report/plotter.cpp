@@ -130,9 +130,11 @@ std::string plot_clause(const Curve& curve) {
     case Mark::kPoints:
     case Mark::kRuns:
       return "'-' using 1:2 with lines " + stroke(curve) + " notitle";
-    case Mark::kErrorBars:
-      return fmt::format("'-' using 1:2:3:4 with yerrorbars pt 7 ps 0.45 lc rgb '{}' lw 1 notitle",
-                         curve.colour);
+    case Mark::kErrorBars:  // whiskers, then dots
+      return fmt::format(
+          "'-' using 1:2 with lines lc rgb '{0}' lw 1 notitle, '-' using 1:2 with lines lc rgb '{0}' lw 5 "
+          "notitle",
+          curve.colour);
     case Mark::kBand:
       return fmt::format("'-' using 1:2:3 with filledcurves fs solid noborder lc rgb '{}' notitle",
                          kBandColour);
@@ -152,7 +154,17 @@ void send_strokes(Gnuplot& gnuplot, const std::vector<double>& left, const std::
   gnuplot << "e\n";
 }
 
-void send_data(Gnuplot& gnuplot, const Curve& curve, Range x_range) {
+void send_whiskers(Gnuplot& gnuplot, const Curve& curve) {
+  gnuplot << std::defaultfloat << std::setprecision(9);
+  for (std::size_t i = 0; i < curve.x.size(); ++i) {
+    if (!std::isfinite(curve.x[i]) || !std::isfinite(curve.low[i] + curve.high[i])) continue;
+    gnuplot << curve.x[i] << ' ' << curve.low[i] << '\n' << curve.x[i] << ' ' << curve.high[i] << "\n\n";
+  }
+  gnuplot << "e\n";
+}
+
+/// `least`: the shortest stroke that the SVG's two decimals still show, in units of x.
+void send_data(Gnuplot& gnuplot, const Curve& curve, double least) {
   switch (curve.mark) {
     case Mark::kLine:
     case Mark::kSteps:
@@ -160,17 +172,18 @@ void send_data(Gnuplot& gnuplot, const Curve& curve, Range x_range) {
       gnuplot.send1d(std::make_tuple(curve.x, curve.y));
       return;
     case Mark::kErrorBars:
-      gnuplot.send1d(std::make_tuple(curve.x, curve.y, curve.low, curve.high));
+      send_whiskers(gnuplot, curve);
+      send_strokes(gnuplot, curve.x, curve.x, curve.y, least);
       return;
     case Mark::kBand:
       gnuplot.send1d(std::make_tuple(curve.x, curve.low, curve.high));
       return;
     // A dot is a stroke too short to be seen as one, with round ends: a tenth of the bytes of gnuplot's symbols.
     case Mark::kPoints:
-      send_strokes(gnuplot, curve.x, curve.x, curve.y, 3e-5 * x_range.span());
+      send_strokes(gnuplot, curve.x, curve.x, curve.y, least);
       return;
     case Mark::kRuns:
-      send_strokes(gnuplot, curve.low, curve.high, curve.y, 3e-5 * x_range.span());
+      send_strokes(gnuplot, curve.low, curve.high, curve.y, least);
       return;
   }
 }
@@ -271,7 +284,7 @@ void send_panel(Gnuplot& gnuplot, const Panel& panel, const PlacedPanel& placed,
                          1 - placed.top / layout.height, 1 - (placed.top + placed.height) / layout.height);
   gnuplot << fmt::format("set xrange [{:.12g}:{:.12g}]\nset yrange [{:.12g}:{:.12g}]\n", x.low, x.high, y.low,
                          y.high);
-  send_ticks(gnuplot, 'x', panel.x, x, placed.width, placed.width < 250 ? 44 : 60, placed.x_labelled);
+  send_ticks(gnuplot, 'x', panel.x, x, placed.width, placed.width < 250 ? 34 : 60, placed.x_labelled);
   send_ticks(gnuplot, 'y', panel.y, y, placed.height, 27, true);
   send_decorations(gnuplot, panel, placed, layout, letter);
   gnuplot << "plot ";
@@ -281,7 +294,7 @@ void send_panel(Gnuplot& gnuplot, const Panel& panel, const PlacedPanel& placed,
     separator = ", ";
   }
   gnuplot << "\n";
-  for (const Curve& curve : panel.curves) send_data(gnuplot, curve, x);
+  for (const Curve& curve : panel.curves) send_data(gnuplot, curve, 0.03 / placed.width * x.span());
 }
 
 void send_figure(Gnuplot& gnuplot, const Figure& figure, const fs::path& file) {
@@ -292,9 +305,9 @@ void send_figure(Gnuplot& gnuplot, const Figure& figure, const fs::path& file) {
   gnuplot << "set encoding utf8\nset minussign\nset output " << quoted(file.string()) << "\n";
   gnuplot << "set datafile missing 'nan'\nset border 3 lw 0.9 lc rgb '#555555'\nset tics out nomirror scale "
              "0.5 tc rgb "
-             "'#222222'\nset pointintervalbox 0\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
+             "'#222222'\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
              "1\nset bars "
-             "0.5\nset boxwidth 0.95 relative\n";
+             "0.5\nset boxwidth 1 relative\n";
   gnuplot << "unset key\nset multiplot\n";
   const std::size_t titled = static_cast<std::size_t>(std::count_if(
       figure.panels.begin(), figure.panels.end(), [](const Panel& panel) { return !panel.title.empty(); }));

@@ -246,15 +246,4 @@ Histogram histogram(std::span<const double> values, Range range, std::size_t bin
   return out;
 }
 
-double quantile(std::span<const double> values, double q) {
-  std::vector<double> sorted;
-  sorted.reserve(values.size());
-  std::copy_if(values.begin(), values.end(), std::back_inserter(sorted),
-               [](double v) { return std::isfinite(v); });
-  if (sorted.empty()) return kGap;
-  const auto k = static_cast<std::ptrdiff_t>(q * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), sorted.begin() + k, sorted.end());
-  return sorted[static_cast<std::size_t>(k)];
-}
-
 }  // namespace isac::report

@@ -15,6 +15,8 @@
 #include <span>
 #include <vector>
 
+#include "isac/series/statistics.hpp"
+
 namespace isac::report {
 
 struct Range {
@@ -72,7 +74,6 @@ struct Histogram {
 };
 [[nodiscard]] Histogram histogram(std::span<const double> values, Range range, std::size_t bins);
 
-/// The q-quantile (0…1) of the finite values, NaN without any.
-[[nodiscard]] double quantile(std::span<const double> values, double q);
+using series::quantile;
 
 }  // namespace isac::report

@@ -80,6 +80,7 @@ std::string embeddable_svg(const std::string& gnuplot_svg, const std::string& id
   replace_all(body, "font-family=\"Arial Bold\"", "font-weight=\"600\"");
   replace_all(body, ".00\"", "\"");
   replace_all(body, " stroke-linecap=\"round\" stroke-linejoin=\"round\"", "");
+  replace_all(body, " stroke-dasharray='2,4' class=\"gridline\"", "");  // a light grid, not a dotted one
   replace_all(body, "<text> ", "<text>");
   for (int pass = 0; pass < 3; ++pass) drop_empty_groups(body);
 
