@@ -1,21 +1,21 @@
 /// @file
-/// Muscle models M1 to M6 fitted to recordings of force, pressure and contraction, and ranked on recordings
-/// held out.
+/// Muscle models M1 to M6 fitted to recordings of force, pressure and contraction, and ranked on recordings held out.
 ///
-///   minimise Σ over runs, samples  (F_measured − z_run − s(valve) · h − F_model(p, ε, ε̇; θ, l0))²        by
-///   Ceres
+///   minimise Σ over runs, branches, points  w (F_measured − z_run − max(0, F_model(p, ε + δ/l0, ε̇; θ)))²        by Ceres
 ///
-/// z_run is the force sensor's zero in that run (it differs by test): known (`MuscleRun::force_zero`), or
-/// fitted along. Readings at the sensor's lower stop (`force_floor`) are censored: they count only where the
-/// model lies above the stop. Filling and exhausting branches weigh the same, so the fit follows the mean
-/// path; their distance is reported as the width of the hysteresis. A held-out run is scored with the same
-/// treatment of zero and stop as every other model and law. docs/derivations/muscle_fit.md.
+/// max(0, ·): a muscle does not push. z_run is the force sensor's zero in that run (it differs by test; see ZeroHandling).
+/// δ is the end correction: full contraction shrinks with length as ε_full = ε_∞ − δ/l0, because the ends do not contract;
+/// δ follows from the full contractions of muscles of several lengths, that is from lengths alone, never from held-out
+/// forces. Readings at the sensor's lower stop are censored: they count only where the model lies above the stop. Filling and
+/// exhausting branches weigh the same, so the fit follows the mean path; their distance is the width of the hysteresis.
+/// Held-out runs are scored with the same zero, stop and slack for every model and law. docs/derivations/muscle_fit.md.
 ///
-/// Units: SI inside (Pa, N, m); contraction ε = (l0 − l)/l0, dimensionless; parameters in the unit each
-/// names. Threads: pure function of its arguments. Errors: throws isac::Error (answer is no) "no_usable_data"
-/// without a usable row; unknown model ids and columns of unequal length are a usage error. Every numerical
-/// outcome is data in the result. Source: seed 2.1 to 2.19; models in models/muscle*.hpp. Example:
-/// `fit_muscle(train, heldout, {}).ranking.front().id`.
+/// Units: SI inside (Pa, N, m); contraction ε = (l0 − l)/l0, dimensionless; parameters in the unit each names. Intervals:
+/// sandwich over branches of runs, Student's t; they speak of this muscle under this model, misfit included.
+/// Threads: pure function of its arguments. Errors: throws isac::Error: "no_usable_data" (answer is no) without a usable row;
+/// unknown model ids and columns of unequal length are usage errors. Every numerical outcome is data in the result.
+/// Source: seed 2.1 to 2.19; models in models/muscle_geometry.hpp, models/muscle_empirical.hpp.
+/// Example: `fit_muscle(train, heldout).ranking.front().id`.
 #pragma once
 
 #include <cstddef>
@@ -43,23 +43,32 @@ struct MuscleRun {
   double rest_length = std::numeric_limits<double>::quiet_NaN();  ///< m, l0
   double full_contraction =
       std::numeric_limits<double>::quiet_NaN();  ///< ε of the unloaded muscle at full pressure
-  double force_zero = std::numeric_limits<double>::quiet_NaN();   ///< N, reading without load; NaN: fitted
-  double pressure_zero = 0;                                       ///< Pa, reading without pressure
+  double force_zero =
+      std::numeric_limits<double>::quiet_NaN();  ///< N, reading without load; see ZeroHandling
+  double pressure_zero = 0;                      ///< Pa, reading without pressure
   double force_floor = -std::numeric_limits<double>::infinity();  ///< N, lower stop of the sensor's reading
 };
 
 enum class ZeroHandling {
-  kFitted,    ///< one offset per run is fitted along, held-out runs included (an offset is the sensor's, not
-              ///< the model's)
-  kRecorded,  ///< `force_zero` is subtracted as it stands (0 where NaN)
+  kRecorded,  ///< `force_zero`; where that is NaN, the median reading at the run's lowest pressures
+  kFitted,    ///< one offset per run is fitted along, in held-out runs too (for models and laws alike)
+  kNone,      ///< readings as they stand
+};
+
+/// A muscle of the same make, for the end correction: lengths only.
+struct MuscleLength {
+  double rest_length = 0;       ///< m
+  double full_contraction = 0;  ///< -
 };
 
 struct MuscleFitOptions {
-  /// Ids of models (see muscle_model_ids()); empty: all.
-  std::vector<std::string> models;
-  ZeroHandling zero = ZeroHandling::kFitted;
-  int bins =
-      60;  ///< per run and branch: the runs are condensed to this many mean points over pressure for the fit
+  std::vector<std::string> models;  ///< ids (see muscle_model_ids()); empty: all
+  ZeroHandling zero = ZeroHandling::kRecorded;
+  double end_length = std::numeric_limits<
+      double>::quiet_NaN();  ///< m, δ; NaN: from full contractions, 0 where they are of one length
+  std::vector<MuscleLength> known_muscles;  ///< beside the runs' own, for δ
+  double diameter = 0.01;  ///< m, D0 (2 r0): M2 and M5 know only its product with their other constants
+  int bins = 60;           ///< per run and branch: runs are condensed to this many mean points over pressure
 };
 
 struct MuscleRunResult {
@@ -100,6 +109,7 @@ struct MuscleFit {
   std::vector<MuscleModelResult>
       ranking;  ///< best first: by held-out rmse, or by training rmse when nothing is held out
   std::vector<HysteresisWidth> hysteresis;
+  double end_length = 0;  ///< m, δ as used
   Warnings warnings;
 
   [[nodiscard]] const MuscleModelResult* find(const std::string& id) const noexcept;
