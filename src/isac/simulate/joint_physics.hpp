@@ -1,8 +1,8 @@
 /// @file
 /// The right-hand side of the testbed's differential equations; plant.hpp integrates it.
 ///
-/// State: p1, p2 in kgf/cm², φ, φ̇, then the states of the hidden effects.
-/// Units: SI but for the two pressures of the state. Real time: no heap after construction, noexcept.
+/// State: p1, p2 in kgf/cm², φ, φ̇, then the states of the hidden effects (those of the valve unit in kgf/cm² too).
+/// Units: SI but for the pressures of the state. Real time: no heap after construction, noexcept.
 /// Errors: construction throws isac::Error (usage). Source: docs/derivations/simulated_rig.md.
 #pragma once
 
@@ -35,10 +35,10 @@ struct Torques {
   double joint = 0;   ///< N m, outside them: friction of bearings, stops
 };
 
-/// A hidden effect that enters as a torque.
-struct TorqueEffect {
+/// A hidden effect and where its states begin.
+struct PlacedEffect {
   CompiledEffect effect;
-  std::size_t state = 0;  ///< where its states begin
+  std::size_t state = 0;
 };
 
 class JointPhysics {
@@ -53,6 +53,10 @@ class JointPhysics {
   [[nodiscard]] std::array<double, 2> forces(double torque,
                                              const std::array<double, 2>& pressure) const noexcept;
 
+  /// A new reference has arrived: effects with a memory of commands take a step.
+  void step_valves(const std::array<double, 2>& reference,
+                   std::array<double, kPlantStates>& x) const noexcept;
+
   [[nodiscard]] int touching(double angle) const noexcept;
   /// I and what hidden effects add to it.
   [[nodiscard]] double inertia() const noexcept { return inertia_; }
@@ -62,11 +66,19 @@ class JointPhysics {
 
  private:
   [[nodiscard]] models::JointPoint<double> point_of(const StatePoint& point) const noexcept;
+  [[nodiscard]] std::array<double, 2> targets(const double* command) const noexcept;
+  void add_effects(const std::vector<HiddenEffect>& effects);
+  void valve_rates(const StatePoint& point, const std::array<double, 2>& reference,
+                   std::array<double, kPlantStates>& dxdt) const noexcept;
+  template <typename Visit>
+  void chain_commands(const std::array<double, kPlantStates>& x, double velocity,
+                      const std::array<double, 2>& reference, models::ValvePoint<double>& valve,
+                      double* command, Visit visit) const noexcept;
   void find_dry_friction() noexcept;
 
   JointConfig joint_;
   std::array<ValveUnit, 2> valves_;
-  std::vector<TorqueEffect> torque_effects_;
+  std::vector<PlacedEffect> torque_effects_, valve_effects_;
   double inertia_ = 0;
   bool dry_friction_ = false;
 };

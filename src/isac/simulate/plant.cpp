@@ -135,12 +135,16 @@ class Plant::Impl {
 
  private:
   void apply_edges() noexcept {
+    bool arrived = false;
     for (std::size_t i = 0; i < 2; ++i) {
       while (tubes_[i].next() <= time_) {
         acting_[i] = tubes_[i].pop();
-        fresh_ = true;
+        arrived = true;
       }
     }
+    if (!arrived) return;
+    physics_.step_valves(acting_, x_);
+    fresh_ = true;
   }
 
   bool try_step() noexcept try {

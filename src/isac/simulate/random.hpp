@@ -16,7 +16,16 @@ namespace isac::simulate {
 
 class Random {
  public:
-  enum Stream : std::uint64_t { kForce1 = 1, kForce2, kPressure1, kPressure2, kTiming, kHand, kCalibration };
+  enum Stream : std::uint64_t {
+    kForce1 = 1,
+    kForce2,
+    kPressure1,
+    kPressure2,
+    kTiming,
+    kHand,
+    kCalibration,
+    kSpikes
+  };
 
   Random(std::uint64_t seed, std::uint64_t stream) noexcept {
     std::uint64_t x = seed ^ (stream * 0xD1342543DE82EF95u);

@@ -35,6 +35,7 @@ std::uint32_t to_code(double physical, const ChannelTruth& channel) noexcept {
 Sensors::Sensors(const RigConfig& config)
     : wiring_(wiring_of(config)),
       noise_kind_(config.sensors.noise),
+      effects_(config),
       force_lag_{FirstOrderLag(amplifier_lag(config.sensors)), FirstOrderLag(amplifier_lag(config.sensors))},
       pressure_lag_(force_lag_),
       force_noise_{SensorNoise(level(config.sensors, config.sensors.force_noise, config.sensors.force_hum),
@@ -55,16 +56,21 @@ void Sensors::track(const PlantState& state) noexcept {
       force_lag_[i].reset(t, force);
       pressure_lag_[i].reset(t, pressure);
     }
-    force_[i] = force_lag_[i].update(t, force);
-    pressure_[i] = pressure_lag_[i].update(t, pressure);
+    amplified_.force[i] = force_lag_[i].update(t, force);
+    amplified_.pressure[i] = pressure_lag_[i].update(t, pressure);
   }
   started_ = true;
+  amplified_.angle = state.joint.angle;
+  if (effects_.any()) effects_.track(t, amplified_, state.joint.velocity);
 }
 
 Codes Sensors::convert(const PlantState& state) noexcept {
   Codes codes;
+  Readings seen = amplified_;
+  seen.angle = state.joint.angle;
+  if (effects_.any()) seen = effects_.apply(state.time, seen);
   for (std::size_t i = 0; i < 2; ++i) {
-    double force = force_[i], pressure = pressure_[i];
+    double force = seen.force[i], pressure = seen.pressure[i];
     if (noise_kind_ != NoiseKind::kNone) {
       force += force_noise_[i].sample(state.time);
       pressure += pressure_noise_[i].sample(state.time);
@@ -72,8 +78,7 @@ Codes Sensors::convert(const PlantState& state) noexcept {
     codes.input[kForceInput[i]] = to_code(force, wiring_.force[i]);
     codes.input[kPressureInput[i]] = to_code(pressure, wiring_.pressure[i]);
   }
-  const double count =
-      std::floor(state.joint.angle / (2 * kPi) * wiring_.encoder_steps + wiring_.encoder_middle);
+  const double count = std::floor(seen.angle / (2 * kPi) * wiring_.encoder_steps + wiring_.encoder_middle);
   codes.encoder = static_cast<std::uint32_t>(static_cast<std::int64_t>(count)) % kEncoderModulus;
   return codes;
 }

@@ -17,6 +17,7 @@
 #include "isac/simulate/noise.hpp"
 #include "isac/simulate/plant.hpp"
 #include "isac/simulate/rig_config.hpp"
+#include "isac/simulate/sensor_effects.hpp"
 
 namespace isac::simulate {
 
@@ -35,7 +36,7 @@ class Sensors {
 
   /// Lets the amplifiers follow the rig; call at every step of the plant.
   void track(const PlantState& state) noexcept;
-  /// The codes at the state last tracked.
+  /// The codes at the state last tracked, in which only the encoder looks at `state`.
   [[nodiscard]] Codes convert(const PlantState& state) noexcept;
 
   void hang_weight(std::optional<double> newton) noexcept {
@@ -46,8 +47,9 @@ class Sensors {
  private:
   Wiring wiring_;
   NoiseKind noise_kind_;
+  SensorEffects effects_;
   std::array<FirstOrderLag, 2> force_lag_, pressure_lag_;
-  std::array<double, 2> force_{}, pressure_{};
+  Readings amplified_;
   std::array<SensorNoise, 2> force_noise_, pressure_noise_;
   std::optional<double> weight_, supply_;
   bool started_ = false;
