@@ -190,7 +190,7 @@ struct QuadraticPressureAngle {
                                     .equation = "a dp r^3 phi^2",
                                     .parameter_count = 1,
                                     .parameters = {{"a", "N cm2/(kg m2)", kPerPressure, -1e8 * kPerPressure,
-                                                    1e8 * kPerPressure, 1e5 * kPerPressure}},
+                                                    1e8 * kPerPressure, 1e4 * kPerPressure}},
                                     .state_count = 0,
                                     .torque_term = true,
                                     .linear = true,
