@@ -86,9 +86,9 @@ struct JointParameters {
   [[nodiscard]] constexpr double operator[](JointField field) const noexcept {
     return has(field) ? value[static_cast<std::size_t>(field)] : std::numeric_limits<double>::quiet_NaN();
   }
-  constexpr void set(JointField field, double si_value) noexcept {
+  constexpr void set(JointField field, double value_si) noexcept {
     present |= 1u << static_cast<unsigned>(field);
-    value[static_cast<std::size_t>(field)] = si_value;
+    value[static_cast<std::size_t>(field)] = value_si;
   }
   friend constexpr bool operator==(const JointParameters&, const JointParameters&) noexcept = default;
 };

@@ -205,15 +205,19 @@ Params parse_params(const std::string& text, const std::string& file) {
     }
   }
   std::ranges::stable_sort(found, {}, [](const Found& one) { return std::get<0>(one); });
-  for (const auto& [line, name, table] : found) {
-    params.sections.push_back(read_section(name, *table, file));
-    const std::string& label = params.sections.back().label;
-    const auto twice = [&](const ParamsSection& s) { return s.name == name && s.label == label; };
-    if (std::ranges::count_if(params.sections, twice) > 1) {
-      fail_at(*table, file, "section_twice",
-              "[" + name + "]" + (label.empty() ? "" : " '" + label + "'") +
+  for (const Found& one : found) {
+    const std::string& name = std::get<1>(one);
+    const toml::table& table = *std::get<2>(one);
+    ParamsSection section = read_section(name, table, file);
+    const auto twice = [&section](const ParamsSection& other) {
+      return other.name == section.name && other.label == section.label;
+    };
+    if (std::ranges::any_of(params.sections, twice)) {
+      fail_at(table, file, "section_twice",
+              "[" + name + "]" + (section.label.empty() ? "" : " '" + section.label + "'") +
                   " stands in the file twice; give it another label or keep one");
     }
+    params.sections.push_back(std::move(section));
   }
   params.other_keys = format_rest(other_keys);
   params.other_tables = format_rest(other_tables);
