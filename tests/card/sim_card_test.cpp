@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "isac/card/calibration.hpp"
 #include "isac/card/card.hpp"
 #include "isac/card/sim_options.hpp"
+#include "isac/core/error.hpp"
 
 namespace isac::card {
 namespace {
@@ -163,6 +165,16 @@ TEST(SimCard, person_takes_the_joint_up_and_lets_it_go) {
     highest = std::max(highest, rig->truth().joint.angle);
   }
   EXPECT_NEAR(0.5 * (lowest + highest), 0.391, 0.02);
+}
+
+TEST(SimCard, person_refuses_what_nobody_can_do) {
+  const Opened rig = open("sim:");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  using Kind = Task::Kind;
+  EXPECT_THROW(rig.person->ask({.kind = Kind::kSweepByHand, .amplitude_rad = 0.3, .speed_rad_s = 0}), Error);
+  EXPECT_THROW(rig.person->ask({.kind = Kind::kSweepByHand, .amplitude_rad = nan, .speed_rad_s = 1}), Error);
+  EXPECT_THROW(rig.person->ask({.kind = Kind::kClamp, .angle_rad = nan}), Error);
+  EXPECT_NO_THROW(rig.person->ask({.kind = Kind::kRest}));
 }
 
 TEST(SimCard, vent_lets_the_air_out) {

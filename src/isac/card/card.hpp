@@ -95,6 +95,7 @@ struct Task {
 class Person {
  public:
   virtual ~Person() = default;
+  /// Throws isac::Error (usage) for a task that nobody can do: a number that is not finite, a sweep without speed.
   virtual void ask(const Task& task) = 0;
   /// True once the last task has been taken up: the joint is where it was asked to be and sweeps, holds or is
   /// free.

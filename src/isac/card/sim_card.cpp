@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "isac/core/error.hpp"
+
 namespace isac::card {
 
 namespace {
@@ -110,6 +112,16 @@ Status SimCard::outputs(Command& command) const noexcept {
 
 void SimPerson::ask(const Task& task) {
   using Kind = Task::Kind;
+  const bool sensible = std::isfinite(task.amplitude_rad) && task.amplitude_rad >= 0 &&
+                        std::isfinite(task.speed_rad_s) && std::isfinite(task.angle_rad) &&
+                        std::isfinite(task.load_newton) && std::isfinite(task.pressure_pascal) &&
+                        (task.kind != Kind::kSweepByHand || task.speed_rad_s > 0);
+  if (!sensible) {
+    throw Error(ErrorKind::kUsage, "task_impossible",
+                "a person cannot do this: angles, loads and pressures must be finite numbers, and a sweep "
+                "needs a speed "
+                "above 0 and an amplitude not below 0.");
+  }
   const bool at_the_rig =
       task.kind != Kind::kRemoveLoad && task.kind != Kind::kHangWeight && task.kind != Kind::kConnectSupply;
   if (at_the_rig) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
