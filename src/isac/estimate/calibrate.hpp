@@ -42,6 +42,7 @@ struct CalibrationOptions {
   std::string reading_unit = "count";
   double reading_low = 0;         ///< lower stop of the reading
   double reading_high = 4095;     ///< upper stop of the reading
+  double resolution = 1;          ///< reading units: a reading that rests says no more than this
   double average_seconds = 0.05;  ///< length of the averages (seed: 50 ms)
   double sample_time = 0.002;     ///< s, where levels carry no time
   double smallest_change = 8;     ///< reading units: a channel that moves less over all levels is dead
