@@ -111,11 +111,16 @@ TEST(Errata, printed_joint_gain_of_0_3_would_need_another_radius) {
 }
 
 TEST(Errata, table_6_1_column_is_a_diameter_in_metres) {
-  // Static range at ±2 kg/cm²: φ = B Δp/(−A r). With the testbed's A and B, 0.030 as a radius reaches 0.5 rad, as a
-  // diameter 1 rad: twice as far.
-  const auto reach = [](double radius) { return 174.2 * 2 / (23450 * radius); };
-  EXPECT_NEAR(reach(0.030), 0.495, 1e-3);
-  EXPECT_NEAR(reach(0.015), 0.990, 1e-3);
+  // Static range at ±2 kg/cm²: |φ| = B Δp/(−A r). The arm's own pose of sec 6.4 bends joints 2, 3 and 5 (coupled with 4
+  // and 6) by 45° and more against gravity; read as a radius, the column would not even let them get there.
+  struct Row {
+    double a, b, column;
+  };
+  for (const Row& joint : {Row{-108000, 970, 0.025}, Row{-80600, 334, 0.020}, Row{-37600, 138, 0.015}}) {
+    const auto reach = [&](double radius) { return joint.b * 2 / (-joint.a * radius); };
+    EXPECT_GT(reach(joint.column / 2), kPi / 4);
+    EXPECT_LT(reach(joint.column), kPi / 4);
+  }
 }
 
 TEST(Errata, eq_4_7_has_a_latency_of_14_ms_and_not_15) {
