@@ -24,7 +24,7 @@
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"
 #include "isac/record/rig.hpp"
-#include "isac/report/calibration_report.hpp"
+#include "isac/report/fit_reports.hpp"
 
 namespace isac::apps {
 namespace {
@@ -199,9 +199,10 @@ int run_calibrate(const Call& call, const std::string& json_path) {
   }
   if (!call.report.empty()) {
     report::CalibrationReportInput input;
-    input.title = "Calibration";
+    input.head.created = now_iso8601();
+    input.head.rig = rig.name;
     input.channels = found.channels;
-    input.valves = found.valves;
+    for (const auto& valve : found.valves) input.channels.push_back(valve.line);
     input.middles = found.middles;
     record::write_atomically(call.report, report::render_calibration_report(input));
   }

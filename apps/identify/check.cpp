@@ -16,7 +16,7 @@
 #include "isac/core/error.hpp"
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"
-#include "isac/report/check_report.hpp"
+#include "isac/report/fit_reports.hpp"
 #include "isac/series/signal_summary.hpp"
 
 namespace isac::apps {
@@ -97,9 +97,9 @@ int run_check(const Call& call, const std::string& json_path) {
   }
   if (!call.report.empty() && !recordings.empty()) {
     report::CheckReportInput input;
-    input.title = "Recorded signals";
+    input.head.created = now_iso8601();
     input.recordings = recordings;
-    input.summaries = summaries;
+    for (const auto& summary : summaries) input.findings.push_back(summary.remarks);
     record::write_atomically(call.report, report::render_check_report(input));
   }
   if (!json_path.empty()) write_text(json_path, answer.dump(2));

@@ -17,6 +17,7 @@ using Body = std::function<int()>;
 
 /// `json_path` outlives the call; every subcommand's --json writes into it.
 Body add_joint(CLI::App& program, std::string& json_path);
+Body add_motion(CLI::App& program, std::string& json_path);
 Body add_pcu(CLI::App& program, std::string& json_path);
 Body add_muscle(CLI::App& program, std::string& json_path);
 Body add_calibrate(CLI::App& program, std::string& json_path);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "isac/core/error.hpp"
+#include "isac/series/derive.hpp"
 
 namespace isac::apps {
 namespace fs = std::filesystem;
@@ -89,12 +90,8 @@ estimate::JointRun joint_run(const series::Recording& recording, const JointSign
   if (signals.needs_pressure) {
     const auto& p1 = recording.column("p1").values;
     const auto& p2 = recording.column("p2").values;
-    run.delta_pressure.resize(p1.size());
-    run.mean_pressure.resize(p1.size());
-    for (std::size_t i = 0; i < p1.size(); ++i) {
-      run.delta_pressure[i] = 0.5 * (p2[i] - p1[i]);  // Δp = (p2 − p1)/2
-      run.mean_pressure[i] = 0.5 * (p1[i] + p2[i]);
-    }
+    run.delta_pressure = series::pressure_difference(p1, p2);
+    run.mean_pressure = series::mean_pressure(p1, p2);
   }
 
   const series::Column* output = recording.find(signals.output);
@@ -108,11 +105,8 @@ estimate::JointRun joint_run(const series::Recording& recording, const JointSign
                   "chain_wheel_diameter",
                   {recording.source, 0, 0});
     }
-    const auto& F1 = recording.column("F1").values;
-    const auto& F2 = recording.column("F2").values;
-    run.output.resize(F1.size());
-    for (std::size_t i = 0; i < F1.size(); ++i)
-      run.output[i] = (F2[i] - F1[i]) * signals.wheel_radius;  // T = (F2 − F1) r
+    run.output = series::torque_from_forces(recording.column("F1").values, recording.column("F2").values,
+                                            signals.wheel_radius);
   } else {
     run.output = recording.column(signals.output).values;  // throws and names what is missing
   }

@@ -22,7 +22,7 @@
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"
 #include "isac/record/params.hpp"
-#include "isac/report/muscle_report.hpp"
+#include "isac/report/fit_reports.hpp"
 
 namespace isac::apps {
 namespace {
@@ -113,7 +113,7 @@ int run_muscle(const Call& call, const std::string& json_path) {
 
   if (!call.report.empty()) {
     report::MuscleReportInput input;
-    input.title = "Muscle";
+    input.head.created = now_iso8601();
     input.fit = &fit;
     record::write_atomically(call.report, report::render_muscle_report(input));
   }

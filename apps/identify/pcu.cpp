@@ -20,7 +20,7 @@
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"
 #include "isac/record/params.hpp"
-#include "isac/report/pcu_report.hpp"
+#include "isac/report/fit_reports.hpp"
 
 namespace isac::apps {
 namespace {
@@ -104,7 +104,7 @@ int run_pcu(const Call& call, const std::string& json_path) {
 
   if (!call.report.empty()) {
     report::PcuReportInput input;
-    input.title = "Valve unit";
+    input.head.created = now_iso8601();
     input.fit = &fit;
     record::write_atomically(call.report, report::render_pcu_report(input));
   }
