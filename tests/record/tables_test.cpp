@@ -65,7 +65,8 @@ Params arm() {
   }
   ParamsSection pcu;
   pcu.name = "pcu";
-  pcu.values = {estimate("K_C", "-", 1.0), estimate("T_C", "ms", 170), estimate("dead_time", "s", 0.01)};
+  pcu.values = {estimate("K_C", "-", 1.0), estimate("T_C", "ms", 170), estimate("dead_time", "s", 0.01),
+                estimate("T_fill", "s", 0.18), estimate("T_vent", "s", 0.16)};
   params.sections.push_back(pcu);
   ParamsSection masses;
   masses.name = "masses";
@@ -126,6 +127,8 @@ TEST(Tables, carry_the_arm_in_si) {
   EXPECT_EQ(table.joints[3][JointField::kPositionI], 10);
   for (int i = 0; i < 6; ++i)
     EXPECT_NEAR(table.joints[i][JointField::kValveLag], 0.17, 1e-16) << "one valve unit for all";
+  EXPECT_EQ(table.joints[5][JointField::kValveLagFill], 0.18);
+  EXPECT_EQ(table.joints[5][JointField::kValveLagVent], 0.16);
   EXPECT_EQ(table.joints[5][JointField::kAngleHigh], 1.178);
   EXPECT_TRUE(table.has_masses);
   EXPECT_NEAR(table.masses[2], 0.14, 1e-16);
@@ -165,6 +168,34 @@ TEST(Tables, terms_under_their_catalogue_names_reach_their_places) {
   EXPECT_EQ(table.effects[0].joint, 0);
 }
 
+TEST(Tables, an_effect_of_several_parameters_is_deployed_in_the_catalogues_order_or_not_at_all) {
+  const auto& info =
+      models::effect_catalogue()[static_cast<std::size_t>(models::find_effect("stribeck_friction"))];
+  ASSERT_GE(info.parameter_count, 2);
+  Params params;
+  ParamsSection joint;
+  joint.name = "joint";
+  for (int i = info.parameter_count - 1; i >= 0; --i) {  // in the file the last comes first
+    joint.values.push_back(estimate(std::string("stribeck_friction.") + info.parameters[i].name,
+                                    info.parameters[i].unit, 0.5 + i));
+  }
+  params.sections.push_back(joint);
+  const models::ParameterTable whole = parameter_table(params);
+  ASSERT_EQ(whole.effect_count, 1);
+  EXPECT_EQ(whole.effects[0].id_hash, models::effect_id_hash("stribeck_friction"));
+  EXPECT_EQ(whole.effects[0].parameter_count, info.parameter_count);
+  for (int i = 0; i < info.parameter_count; ++i) {
+    EXPECT_EQ(whole.effects[0].parameters[static_cast<std::size_t>(i)],
+              (0.5 + i) * info.parameters[i].si_per_unit);
+  }
+
+  params.sections[0].values.pop_back();
+  Warnings warnings;
+  EXPECT_EQ(parameter_table(params, &warnings).effect_count, 0);
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].text.find("lacks one of its parameters"), std::string::npos);
+}
+
 TEST(Tables, what_is_not_identifiable_is_left_out_and_said) {
   Params params = arm();
   params.sections[0].values[2].identifiable = false;
@@ -184,6 +215,7 @@ TEST(Tables, refuse_what_cannot_be_deployed) {
       (void)make_tables(params);
       return "accepted";
     } catch (const Error& error) {
+      EXPECT_EQ(error.place().file, "params.toml");
       return error.code();
     }
   };

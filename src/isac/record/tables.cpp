@@ -1,6 +1,7 @@
 #include "isac/record/tables.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -35,8 +36,8 @@ constexpr Slot kPcuSlots[] = {
     {"K_C", JointField::kValveGain, dimension::kNone},
     {"T_C", JointField::kValveLag, dimension::kTime},
     {"dead_time", JointField::kValveDeadTime, dimension::kTime},
-    {"T_C_fill", JointField::kValveLagFill, dimension::kTime},
-    {"T_C_vent", JointField::kValveLagVent, dimension::kTime},
+    {"T_fill", JointField::kValveLagFill, dimension::kTime},
+    {"T_vent", JointField::kValveLagVent, dimension::kTime},
 };
 constexpr Slot kGainSlots[] = {
     {"K_P_position", JointField::kPositionP, dimension::kTorque},
@@ -52,6 +53,11 @@ constexpr ConstantSlot kConstants[] = {
     {"wheel_radius_m", JointField::kWheelRadius},
     {"initial_pressure_Pa", JointField::kInitialPressure},
     {"inertia_kg_m2", JointField::kInertia},
+};
+
+/// The table while it is filled: which parameters of each effect were given.
+struct Draft : models::ParameterTable {
+  std::array<unsigned, models::kMaxTableEffects> given{};
 };
 
 [[noreturn]] void refuse(std::string code, std::string text) {
@@ -105,7 +111,7 @@ const Slot* find_joint_slot(std::string_view name) {
   return nullptr;
 }
 
-models::TableEffect& effect_record(models::ParameterTable& table, int effect, std::uint8_t joint) {
+models::TableEffect& effect_record(Draft& table, int effect, std::uint8_t joint) {
   const models::EffectInfo& info = models::effect_catalogue()[static_cast<std::size_t>(effect)];
   const std::uint32_t hash = models::effect_id_hash(info.id);
   for (int i = 0; i < table.effect_count; ++i) {
@@ -128,12 +134,15 @@ int parameter_index(const models::EffectInfo& info, std::string_view name) {
   for (int i = 0; i < info.parameter_count; ++i) {
     if (name == info.parameters[i].name) return i;
   }
-  return info.parameter_count == 1 && name == info.id ? 0 : -1;
+  const int named = models::find_effect(name);  // an alias is as good as the id
+  const bool is_id = named >= 0 && models::effect_catalogue()[static_cast<std::size_t>(named)].id ==
+                                       std::string_view(info.id);
+  return info.parameter_count == 1 && is_id ? 0 : -1;
 }
 
 /// Puts `value` into the record of an effect named by its id, or by "id.parameter".
-bool add_effect(models::ParameterTable& table, const ParamsSection& section, const Estimated& value,
-                std::string_view id, std::uint8_t joint, Warnings* warnings) {
+bool add_effect(Draft& table, const ParamsSection& section, const Estimated& value, std::string_view id,
+                std::uint8_t joint, Warnings* warnings) {
   const int effect = models::find_effect(id);
   if (effect < 0) return false;
   const models::EffectInfo& info = models::effect_catalogue()[static_cast<std::size_t>(effect)];
@@ -151,7 +160,9 @@ bool add_effect(models::ParameterTable& table, const ParamsSection& section, con
     refuse("unit_unknown", value.name + " of " + title(section) + " has the unknown unit '" + value.unit +
                                "'; give it in '" + info.parameters[index].unit + "'");
   }
-  effect_record(table, effect, joint).parameters[static_cast<std::size_t>(index)] = si;
+  models::TableEffect& record = effect_record(table, effect, joint);
+  record.parameters[static_cast<std::size_t>(index)] = si;
+  table.given[static_cast<std::size_t>(&record - table.effects.data())] |= 1u << static_cast<unsigned>(index);
   return true;
 }
 
@@ -159,8 +170,7 @@ void set_if_finite(models::JointParameters& joint, JointField field, double valu
   if (std::isfinite(value)) joint.set(field, value);
 }
 
-void fill_joint(models::ParameterTable& table, std::uint8_t index, const ParamsSection& section,
-                Warnings* warnings) {
+void fill_joint(Draft& table, std::uint8_t index, const ParamsSection& section, Warnings* warnings) {
   models::JointParameters& joint = table.joints[index];
   for (const Estimated& value : section.values) {
     if (const Slot* slot = find_joint_slot(value.name)) {
@@ -216,7 +226,7 @@ void fill_masses(models::ParameterTable& table, const ParamsSection& section, Wa
   table.has_masses = true;
 }
 
-void fill_effects(models::ParameterTable& table, const ParamsSection& section, Warnings* warnings) {
+void fill_effects(Draft& table, const ParamsSection& section, Warnings* warnings) {
   std::uint8_t joint = models::kAllJoints;
   for (const auto& [name, value] : section.constants) {
     if (name != "joint") continue;
@@ -231,6 +241,34 @@ void fill_effects(models::ParameterTable& table, const ParamsSection& section, W
       warn(warnings, "left_out",
            value.name + " of " + title(section) + " is no parameter of the catalogue and was left out.");
     }
+  }
+}
+
+/// An effect with a parameter missing would be computed with a zero that nobody identified: it is left out as a whole.
+void drop_incomplete_effects(Draft& table, Warnings* warnings) {
+  int kept = 0;
+  for (int i = 0; i < table.effect_count; ++i) {
+    const models::TableEffect effect = table.effects[static_cast<std::size_t>(i)];
+    if (table.given[static_cast<std::size_t>(i)] == (1u << effect.parameter_count) - 1) {
+      table.effects[static_cast<std::size_t>(kept++)] = effect;
+      continue;
+    }
+    for (const models::EffectInfo& info : models::effect_catalogue()) {
+      if (models::effect_id_hash(info.id) != effect.id_hash) continue;
+      warn(warnings, "left_out", std::string(info.id) + " lacks one of its parameters and was left out.");
+    }
+  }
+  for (int i = kept; i < table.effect_count; ++i) table.effects[static_cast<std::size_t>(i)] = {};
+  table.effect_count = kept;
+}
+
+/// parameter_table with the file's name in its errors.
+models::ParameterTable table_of_file(const Params& params, const std::string& source_name,
+                                     Warnings& warnings) {
+  try {
+    return parameter_table(params, &warnings);
+  } catch (const Error& error) {
+    throw Error(error.kind(), error.code(), error.text(), {source_name, 0, 0});
   }
 }
 
@@ -260,7 +298,7 @@ models::ParameterTable parameter_table(const Params& params, Warnings* warnings)
                                   std::to_string(models::kMaxTableJoints) +
                                   "; export each arm's file by itself");
   }
-  models::ParameterTable table;
+  Draft table;
   table.joint_count = static_cast<int>(joints.size());
   for (std::size_t i = 0; i < joints.size(); ++i)
     fill_joint(table, static_cast<std::uint8_t>(i), *joints[i], warnings);
@@ -270,6 +308,7 @@ models::ParameterTable parameter_table(const Params& params, Warnings* warnings)
     if (section.name == "masses") fill_masses(table, section, warnings);
     if (section.name == "effects") fill_effects(table, section, warnings);
   }
+  drop_incomplete_effects(table, warnings);
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (const Status status = models::detail::check_joint(table.joints[i]); !ok(status)) {
       refuse("value_out_of_range",
@@ -315,7 +354,7 @@ std::vector<std::byte> pack_parameter_table(const models::ParameterTable& table)
 
 DeploymentTables make_tables(const Params& params, const std::string& source_name) {
   DeploymentTables out;
-  const models::ParameterTable table = parameter_table(params, &out.warnings);
+  const models::ParameterTable table = table_of_file(params, source_name, out.warnings);
   out.binary = pack_parameter_table(table);
   out.header = table_header(table, out.binary, params, source_name);
   out.actuator_csv = actuator_csv(table, params);

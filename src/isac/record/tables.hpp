@@ -6,7 +6,7 @@
 /// float64, the same bits in header and binary; the layout stands in models/parameter_table.hpp.
 /// Names in `params.toml`:
 ///  - `[[joint]]` A B C D and other catalogue terms; constants wheel_radius_m, initial_pressure_Pa, inertia_kg_m2;
-///  - `[pcu]` K_C, T_C (or T_C_fill, T_C_vent), dead_time; its label is a joint's, or none: it holds for all joints;
+///  - `[pcu]` K_C, T_C (or T_fill, T_vent), dead_time; its label is a joint's, or none: it holds for all joints;
 ///  - `[gains]` K_P_position, K_I_position, K_P_torque, K_I_torque; label as for `[pcu]`;
 ///  - `[masses]` m1 m2 m3; `[[effects]]` label: the effect's id; constant `joint` (from 1), else it holds for all joints.
 /// Not identifiable values are left out, and the table's bit mask says so.
