@@ -19,7 +19,8 @@ inline Estimated number_of(const std::string& name, const std::string& unit, dou
           .value = value,
           .std_error = std_error,
           .ci_low = value - 1.98 * std_error,
-          .ci_high = value + 1.98 * std_error};
+          .ci_high = value + 1.98 * std_error,
+          .reason = {}};
 }
 
 inline estimate::PcuStep pcu_step(const std::string& run, double from, double to, double lag,
@@ -62,7 +63,9 @@ inline estimate::PcuFit pcu_sample() {
   fit.parameters = {number_of("K_C", "-", 0.9984, 0.0011), number_of("T_C", "s", 0.1974, 0.0009),
                     number_of("dead_time", "s", 0.0121, 0.0003), number_of("T_fill", "s", 0.1704, 0.0008),
                     number_of("T_vent", "s", 0.2251, 0.0010)};
-  Estimated refused{.name = "K_vent", .unit = "-"};
+  Estimated refused;
+  refused.name = "K_vent";
+  refused.unit = "-";
   refused.identifiable = false;
   refused.reason = "no command was recorded for the venting steps; log p1_cmd.";
   fit.parameters.push_back(refused);

@@ -37,8 +37,12 @@ inline void add_run(JointSample& sample, const std::string& name, double frequen
                     double seconds, bool heldout, unsigned seed, double rate = 200) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
-  estimate::JointRun run{.name = name, .experiment = "constant-pressure"};
-  estimate::RunResidual rows{.name = name, .heldout = heldout};
+  estimate::JointRun run;
+  run.name = name;
+  run.experiment = "constant-pressure";
+  estimate::RunResidual rows;
+  rows.name = name;
+  rows.heldout = heldout;
   const auto n = static_cast<std::size_t>(seconds * rate);
   double phase = 0, wander = 0, coloured = 0, square = 0;
   const double amplitude = 0.9;
@@ -79,7 +83,8 @@ inline Estimated estimated(const std::string& name, const std::string& unit, dou
           .value = value,
           .std_error = std_error,
           .ci_low = value - 1.98 * std_error,
-          .ci_high = value + 1.98 * std_error};
+          .ci_high = value + 1.98 * std_error,
+          .reason = {}};
 }
 
 inline void finish(JointSample& sample) {

@@ -88,7 +88,8 @@ void add_middle(Document& page, const estimate::MiddleCalibration& middle) {
   for (std::size_t i = 0; i < middle.approaches.size(); ++i) number_of.push_back(static_cast<double>(i + 1));
   Figure figure{.caption = "Rest position of the encoder at each approach; dashed: the middle.",
                 .panel_height = 170};
-  Panel panel{.x = {.label = "Approach", .unit = "-"}, .y = {.label = "Encoder", .unit = "count"}};
+  Panel panel{.x = {.label = "Approach", .unit = "-", .whole = true},
+              .y = {.label = "Encoder", .unit = "count"}};
   panel.curves = {dots("", colour::kSecond, number_of, middle.approaches, 500, 5)};
   if (std::isfinite(middle.middle.value)) panel.lines = {{.at = middle.middle.value, .label = "middle"}};
   figure.panels = {std::move(panel)};

@@ -82,8 +82,9 @@ void add_statistics(Document& page, const series::Recording& recording) {
     if (s.missing > 0) table.emphasised.push_back(table.rows.size());
     table.rows.push_back({column.name, pretty_unit(shown_unit(column.unit)),
                           whole(static_cast<double>(s.present)), whole(static_cast<double>(s.missing)),
-                          number(s.least * factor), number(s.mean * factor), number(s.greatest * factor),
-                          number(s.deviation() * factor, 3)});
+                          number(s.least * factor),
+                          number(std::abs(s.mean) < 1e-9 * s.deviation() ? 0 : s.mean * factor),
+                          number(s.greatest * factor), number(s.deviation() * factor, 3)});
   }
   page.table(table);
 }

@@ -72,6 +72,7 @@ struct Axis {
   double high = std::numeric_limits<double>::quiet_NaN();  ///< NaN: from the data
   bool tight = false;                                      ///< no margin beyond the data
   bool log = false;
+  bool whole = false;  ///< ticks at whole numbers only
 };
 
 struct Panel {

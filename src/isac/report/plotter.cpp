@@ -196,7 +196,8 @@ void send_ticks(Gnuplot& gnuplot, char axis, const Axis& description, Range rang
     return;
   }
   gnuplot << "unset logscale " << axis << "\n";
-  const double step = tick_step(range.span(), std::max(3.0, std::floor(pixels / per_tick)));
+  double step = tick_step(range.span(), std::max(3.0, std::floor(pixels / per_tick)));
+  if (description.whole) step = std::max(1.0, step);
   gnuplot << fmt::format("set {}tics {:.12g}{}\n", axis, step, axis == 'x' ? " offset 0,0.4" : "");
   gnuplot << fmt::format("set format {} '{}'\n", axis, labelled ? tick_format(step, range) : "");
 }
@@ -285,7 +286,7 @@ void send_panel(Gnuplot& gnuplot, const Panel& panel, const PlacedPanel& placed,
   gnuplot << fmt::format("set xrange [{:.12g}:{:.12g}]\nset yrange [{:.12g}:{:.12g}]\n", x.low, x.high, y.low,
                          y.high);
   send_ticks(gnuplot, 'x', panel.x, x, placed.width, placed.width < 250 ? 34 : 60, placed.x_labelled);
-  send_ticks(gnuplot, 'y', panel.y, y, placed.height, 27, true);
+  send_ticks(gnuplot, 'y', panel.y, y, placed.height, placed.height < 150 ? 20 : 27, true);
   send_decorations(gnuplot, panel, placed, layout, letter);
   gnuplot << "plot ";
   const char* separator = "";
@@ -303,7 +304,7 @@ void send_figure(Gnuplot& gnuplot, const Figure& figure, const fs::path& file) {
       "set terminal svg size {:.0f},{:.0f} dynamic noenhanced rounded font 'Arial,{}' name 'p'\n",
       layout.width, layout.height, kFontSize);
   gnuplot << "set encoding utf8\nset minussign\nset output " << quoted(file.string()) << "\n";
-  gnuplot << "set datafile missing 'nan'\nset border 3 lw 0.9 lc rgb '#555555'\nset tics out nomirror scale "
+  gnuplot << "set border 3 lw 0.9 lc rgb '#555555'\nset tics out nomirror scale "
              "0.5 tc rgb "
              "'#222222'\nset grid xtics ytics back lc rgb '#e4e4e4' lw 0.8 dt "
              "1\nset bars "

@@ -17,9 +17,9 @@ ul { margin: 6px 0; padding-left: 20px; } li { margin: 3px 0; }
 .equation { margin: 14px 0; padding: 12px 18px; border-left: 3px solid #0072b2; background: #f6f8fa; font: 16.5px/1.75 "STIX Two Text", "Times New Roman", "Liberation Serif", "DejaVu Serif", serif; overflow-x: auto; }
 .equation div:not(:first-child) { font-size: 15px; color: #333; }
 .cards { display: flex; flex-wrap: wrap; gap: 10px; margin: 16px 0; }
-.card { flex: 1 1 150px; border: 1px solid #dcdcdc; border-radius: 4px; padding: 10px 14px; }
+.card { flex: 1 1 130px; border: 1px solid #dcdcdc; border-radius: 4px; padding: 10px 14px; }
 .card .label { font-size: 12.5px; color: #555; }
-.card .value { font-size: 20px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.card .value { font-size: 17.5px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }
 .card .note { font-size: 12.5px; color: #555; }
 .scroll { overflow-x: auto; margin: 14px 0; }
 table { border-collapse: collapse; font-size: 13.5px; font-variant-numeric: tabular-nums lining-nums; }
