@@ -241,7 +241,7 @@ int main(int argc, char** argv) {
   CLI::Option* seed =
       app.add_option("--seed", words.seed, "Seed of the excitation, and of sim: where it names none");
   app.add_flag("--raw", words.raw, "Log the card's counts too (enc, ai, ao)");
-  app.add_flag("--overwrite", words.overwrite, "Replace recordings that exist");
+  app.add_flag("--overwrite", words.overwrite, "Replace recordings that exist (the old ones become *.bak)");
   app.add_option("--json", words.json, "Write the verdicts as JSON to a file, or - for standard output");
   app.add_option("--pace", words.pace, "sim: as fast as it can (virtual) or by the wall clock (real)")
       ->check(CLI::IsMember({"virtual", "real"}));

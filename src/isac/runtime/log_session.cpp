@@ -190,6 +190,10 @@ class Session {
       if (work.loop.end != LoopResult::End::kDone) return;
       card::Sample now;
       const std::int64_t card_ns = ok(rig_.card->read(now)) ? now.time_ns : work.loop.began_ns;
+      if (fs::exists(file)) {  // --overwrite: the old one steps aside only now that the new one begins
+        fs::path backup = file;
+        fs::rename(file, backup += ".bak");
+      }
       work.writer = std::make_unique<LogWriter>(file, metadata_of(options_, program, wall_time(card_ns)),
                                                 map_.shape(), options_.raw);
       work.loop = loop.record(*work.writer);

@@ -37,7 +37,7 @@ struct SessionOptions {
   double hand_speed_limit = 0;  ///< rad/s, while a hand moves it
   bool pace_real = false;
   bool raw = false;
-  bool overwrite = false;
+  bool overwrite = false;  ///< an older recording is kept as *.csv.bak
   std::uint64_t seed = 1;
 };
 

@@ -431,6 +431,11 @@ std::vector<Program> make_programs(std::string_view experiment, const Excitation
     refuse("limits_nonsense", "the initial pressure of " + in_kgf(options.initial_pressure) +
                                   " is not below the pressure limit of " + in_kgf(options.pressure_limit));
   }
+  for (const double seconds : {options.duration, options.hold}) {  // before anything grows with them
+    if (!(seconds > kLongest)) continue;
+    refuse("too_long", "a recording of " + number("%.6g", seconds) + " s is longer than a day (" +
+                           number("%.0f", kLongest) + " s); ask for a shorter one");
+  }
   std::vector<Program> programs;
   std::vector<double> levels = options.delta_pressures;
   if (levels.empty()) levels = {0.0};
@@ -457,11 +462,6 @@ std::vector<Program> make_programs(std::string_view experiment, const Excitation
       known += (known.empty() ? "" : ", ") + std::string(info.name);
     refuse("experiment_unknown",
            "there is no experiment '" + std::string(experiment) + "'; choose one of " + known);
-  }
-  for (const Program& program : programs) {
-    if (program.duration <= kLongest) continue;
-    refuse("too_long", "a recording of " + number("%.6g", program.duration) + " s is longer than a day (" +
-                           number("%.0f", kLongest) + " s); ask for a shorter one");
   }
   for (std::size_t i = 0; i < programs.size(); ++i) {  // two levels that round to one file name
     for (std::size_t j = i + 1; j < programs.size(); ++j) {
