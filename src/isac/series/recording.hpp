@@ -29,7 +29,9 @@ struct Recording {
   std::map<std::string, std::string> metadata;  ///< `# key: value` lines
   std::vector<Column> columns;                  ///< the first is `time` where the file has one
 
-  [[nodiscard]] std::size_t rows() const noexcept { return columns.empty() ? 0 : columns.front().values.size(); }
+  [[nodiscard]] std::size_t rows() const noexcept {
+    return columns.empty() ? 0 : columns.front().values.size();
+  }
   [[nodiscard]] const Column* find(std::string_view name) const noexcept;
   [[nodiscard]] const Column& column(std::string_view name) const;
   /// The value of a metadata key, or `fallback`.
