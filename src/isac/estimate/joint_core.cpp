@@ -290,7 +290,7 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
       residual_correlation_time(rows, out.residual, 3.0 * out.spread, window * interval);
   double seconds = options.block_seconds;
   if (!std::isfinite(seconds)) {
-    const double wanted = std::max({20.0 * out.correlation_seconds, 4.0 * window * interval, 0.5});
+    const double wanted = std::max({20.0 * out.correlation_seconds, 4.0 * window * interval, 3.0});
     seconds = std::min(wanted, length / 12.0);
     out.blocks_cut_short = seconds < 0.5 * wanted;
   }

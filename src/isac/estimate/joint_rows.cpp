@@ -1,5 +1,6 @@
 #include "isac/estimate/joint_rows.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -85,30 +86,6 @@ Proportional proportional(const JointTerms& terms, std::size_t k) {
   return {read, factor};
 }
 
-/// Hampel's identifier over seven samples; returns how many were replaced.
-std::size_t remove_spikes(std::vector<double>& y) {
-  constexpr std::size_t kHalf = 3;
-  if (y.size() < 2 * kHalf + 1) return 0;
-  std::vector<double> middle(y.size(), std::nan("")), off(y.size(), std::nan(""));
-  for (std::size_t i = kHalf; i + kHalf < y.size(); ++i) {
-    double near[2 * kHalf + 1];
-    for (std::size_t j = 0; j <= 2 * kHalf; ++j) near[j] = y[i + j - kHalf];
-    if (std::any_of(std::begin(near), std::end(near), [](double v) { return !std::isfinite(v); })) continue;
-    std::nth_element(near, near + kHalf, near + 2 * kHalf + 1);
-    middle[i] = near[kHalf];
-    off[i] = y[i] - middle[i];
-  }
-  const double limit = 6.0 * series::robust_deviation(off, true);
-  if (!(limit > 0)) return 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < y.size(); ++i)
-    if (std::abs(off[i]) > limit) {
-      y[i] = middle[i];
-      ++count;
-    }
-  return count;
-}
-
 RunColumns columns_of(const JointRun& run, const JointTerms& terms, const RowRecipe& recipe) {
   RunColumns out;
   const std::size_t rows = run.time.size();
@@ -122,7 +99,7 @@ RunColumns columns_of(const JointRun& run, const JointTerms& terms, const RowRec
   out.interval = d.interval;
   double velocity_noise = 0;
   if (measured && recipe.unbiased_cube)
-    velocity_noise = series::choose_window(run.time, run.velocity, recipe.order).noise;
+    velocity_noise = series::sample_noise(run.time, run.velocity, recipe.order);
   out.noise = noise_of(recipe, d.interval, measured, std::isfinite(velocity_noise) ? velocity_noise : 0.0);
   out.input[0] = run.angle;
   out.input[1] = measured ? run.velocity : std::move(d.first);
@@ -162,6 +139,80 @@ RunColumns columns_of(const JointRun& run, const JointTerms& terms, const RowRec
   return out;
 }
 
+/// A robust fit to some 20 000 rows, good enough to tell a spike from motion.
+Eigen::VectorXd pilot_fit(const std::vector<RunColumns>& runs, std::size_t terms) {
+  std::size_t total = 0;
+  for (const RunColumns& run : runs) total += run.y.size();
+  const std::size_t stride = std::max<std::size_t>(1, total / 20000);
+  std::vector<std::vector<double>> picked;
+  for (const RunColumns& run : runs)
+    for (std::size_t i = stride / 2; i < run.y.size(); i += stride) {
+      std::vector<double> row;
+      for (std::size_t k = 0; k < terms; ++k) row.push_back(run.x[k][i]);
+      row.push_back(run.y[i]);
+      if (std::all_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); }))
+        picked.push_back(std::move(row));
+    }
+  const auto n = static_cast<Eigen::Index>(picked.size());
+  const auto p = static_cast<Eigen::Index>(terms);
+  Eigen::MatrixXd x(n, p);
+  Eigen::VectorXd y(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index k = 0; k < p; ++k)
+      x(i, k) = picked[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)];
+    y[i] = picked[static_cast<std::size_t>(i)][terms];
+  }
+  const Eigen::VectorXd scale = x.colwise().norm().transpose().cwiseMax(1e-300).cwiseInverse();
+  x = x * scale.asDiagonal();
+  Eigen::VectorXd theta = Eigen::VectorXd::Zero(p), weight = Eigen::VectorXd::Ones(n);
+  for (int round = 0; round < 6; ++round) {
+    Eigen::MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
+    normal.diagonal().array() += 1e-10;  // still columns stay at zero
+    theta = normal.ldlt().solve(x.transpose() * weight.cwiseProduct(y));
+    const Eigen::VectorXd residual = y - x * theta;
+    const double bend =
+        1.345 * series::robust_deviation({residual.data(), static_cast<std::size_t>(n)}, true);
+    if (!(bend > 0)) break;
+    for (Eigen::Index i = 0; i < n; ++i)
+      weight[i] = std::min(1.0, bend / std::max(std::abs(residual[i]), 1e-300));
+  }
+  return theta.cwiseProduct(scale);
+}
+
+/// Hampel's identifier over seven samples of the pilot's residual; returns how many samples were replaced.
+std::size_t remove_spikes(const RunColumns& run, const Eigen::VectorXd& pilot, std::vector<double>& y) {
+  constexpr std::size_t kHalf = 3;
+  if (y.size() < 2 * kHalf + 1) return 0;
+  std::vector<double> residual = y, off(y.size(), std::nan(""));
+  for (std::size_t k = 0; k < run.x.size(); ++k) {
+    const double theta = pilot[static_cast<Eigen::Index>(k)];
+    for (std::size_t i = 0; i < y.size(); ++i) residual[i] -= theta * run.x[k][i];
+  }
+  for (std::size_t i = kHalf; i + kHalf < y.size(); ++i) {
+    double near[2 * kHalf + 1], sum = 0;
+    for (std::size_t j = 0; j <= 2 * kHalf; ++j) sum += near[j] = residual[i + j - kHalf];
+    if (!std::isfinite(sum)) continue;
+    std::nth_element(near, near + kHalf, near + 2 * kHalf + 1);
+    off[i] = residual[i] - near[kHalf];
+  }
+  std::vector<double> some;
+  const std::size_t stride = std::max<std::size_t>(1, off.size() / 50000);
+  for (std::size_t i = 0; i < off.size(); i += stride) some.push_back(off[i]);
+  // A spike stands out of its neighbours and out of the residual as a whole; noise that grows with speed does neither.
+  std::vector<double> overall;
+  for (std::size_t i = 0; i < residual.size(); i += stride) overall.push_back(residual[i]);
+  const double limit =
+      std::max(6.0 * series::robust_deviation(some, true), 4.0 * series::robust_deviation(overall, true));
+  if (!(limit > 0)) return 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < y.size(); ++i)
+    if (std::abs(off[i]) > limit) {
+      y[i] -= off[i];
+      ++count;
+    }
+  return count;
+}
+
 }  // namespace
 
 JointState JointRows::state(std::size_t i) const {
@@ -175,14 +226,19 @@ JointRows make_rows(std::span<const JointRun> runs, const JointTerms& terms, con
   if (recipe.parallel_filter) out.filtered.resize(terms_count);
   const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
   const std::vector<double> low_pass = series::implied_low_pass(polynomial);
-  for (const JointRun& run : runs) {
+  std::vector<RunColumns> all;
+  for (const JointRun& run : runs) all.push_back(columns_of(run, terms, recipe));
+  const bool clean = recipe.parallel_filter && recipe.clean_spikes;
+  const Eigen::VectorXd pilot = clean ? pilot_fit(all, terms_count) : Eigen::VectorXd();
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const JointRun& run = runs[r];
     const std::size_t rows = run.time.size();
     out.seen += rows;
-    RunColumns columns = columns_of(run, terms, recipe);
+    const RunColumns& columns = all[r];
     std::vector<double> cleaned;
     if (recipe.parallel_filter) {
       cleaned = columns.y;
-      if (recipe.clean_spikes) out.cleaned += remove_spikes(cleaned);
+      if (clean) out.cleaned += remove_spikes(columns, pilot, cleaned);
     }
     std::vector<std::vector<double>> filtered;
     std::vector<double> filtered_output;
@@ -242,13 +298,16 @@ bool constant_slope(const JointTerms& terms, std::size_t k, Input input) {
       .angle = -0.8, .velocity = -2.1, .acceleration = -1.3, .delta_pressure = -9e4, .mean_pressure = 3e5};
   const double h = input == Input::kDeltaPressure || input == Input::kMeanPressure ? 1e3 : 1e-2;
   const double first = slope(terms, k, a, input, h), second = slope(terms, k, b, input, h);
-  return std::abs(first - second) <= 1e-9 * std::abs(first);
+  const double middle = slope(terms, k, {}, input, h);  // a step at zero is flat on both sides
+  return std::abs(first - second) <= 1e-9 * std::abs(first) &&
+         std::abs(first - middle) <= 1e-9 * std::abs(first);
 }
 
 struct Sensitivity {
   std::size_t k;
   Input input;
   bool constant;
+  double cube;  ///< factor of v³ for cubic damping, else 0
 };
 
 std::vector<Sensitivity> sensitivities(const JointTerms& terms) {
@@ -256,16 +315,13 @@ std::vector<Sensitivity> sensitivities(const JointTerms& terms) {
   for (std::size_t k = 0; k < terms.linear().size(); ++k)
     for (int z = 0; z < kInputs; ++z)
       if (terms.reads(k, static_cast<Input>(z)))
-        out.push_back({k, static_cast<Input>(z), constant_slope(terms, k, static_cast<Input>(z))});
+        out.push_back({k, static_cast<Input>(z), constant_slope(terms, k, static_cast<Input>(z)),
+                       terms.is_cubic_damping(k) ? terms.regressor(k, {.velocity = 1.0}) : 0.0});
   return out;
 }
 
 double sensitivity_at(const JointTerms& terms, const Sensitivity& s, const JointState& state, double sigma) {
-  if (terms.is_cubic_damping(s.k)) {
-    const double v = state.velocity;
-    const double sign = terms.regressor(s.k, {.velocity = 1.0}) > 0 ? 1.0 : -1.0;
-    return sign * 3.0 * sigma * (v * v - sigma * sigma);
-  }
+  if (s.cube != 0.0) return s.cube * 3.0 * sigma * (state.velocity * state.velocity - sigma * sigma);
   return slope(terms, s.k, state, s.input, sigma);
 }
 
@@ -295,25 +351,43 @@ Eigen::MatrixXd noise_gram(const JointRows& rows, const JointTerms& terms, const
           out(static_cast<Eigen::Index>(all[a].k), static_cast<Eigen::Index>(all[b].k)) +=
               weight * d[a] * d[b];
     if (!varying) continue;
+    // Cubic damping needs moments of the speed only: Var(v̂³ − 3σ²v̂) has the unbiased estimate 9σ²v̂⁴ − 36σ⁴v̂² + 15σ⁶,
+    // its covariance with v̂ 3σ²(v̂² − σ²).
+    const double s2 = sigma[static_cast<int>(Input::kVelocity)] * sigma[static_cast<int>(Input::kVelocity)];
+    const double* v = rows.input[static_cast<int>(Input::kVelocity)].data();
+    double m2 = 0, m4 = 0;
+    for (std::size_t i = first; i < last; ++i) {
+      const double w = omega != nullptr ? omega[i] : 1.0, v2 = v[i] * v[i];
+      m2 += w * v2;
+      m4 += w * v2 * v2;
+    }
+    bool others = false;
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      others = others || (!all[a].constant && all[a].cube == 0.0);
+      if (all[a].cube == 0.0) continue;
+      const auto ka = static_cast<Eigen::Index>(all[a].k);
+      out(ka, ka) +=
+          all[a].cube * all[a].cube * (9.0 * s2 * m4 - 36.0 * s2 * s2 * m2 + 15.0 * s2 * s2 * s2 * weight);
+      for (std::size_t b = 0; b < all.size(); ++b) {
+        if (!all[b].constant || all[b].input != Input::kVelocity || s2 == 0.0) continue;
+        const auto kb = static_cast<Eigen::Index>(all[b].k);
+        const double cross = all[a].cube * 3.0 * std::sqrt(s2) * d[b] * (m2 - s2 * weight);
+        out(ka, kb) += cross;
+        out(kb, ka) += cross;
+      }
+    }
+    if (!others) continue;
     for (std::size_t i = first; i < last; ++i) {
       const double w = omega != nullptr ? omega[i] : 1.0;
       const JointState state = rows.state(i);
       for (std::size_t a = 0; a < all.size(); ++a)
         if (!all[a].constant)
           d[a] = sensitivity_at(terms, all[a], state, sigma[static_cast<int>(all[a].input)]);
+      const auto general = [&](const Sensitivity& s) { return !s.constant && s.cube == 0.0; };
       for (std::size_t a = 0; a < all.size(); ++a)
-        for (std::size_t b = 0; b < all.size(); ++b) {
-          if (all[a].input != all[b].input || (all[a].constant && all[b].constant)) continue;
-          out(static_cast<Eigen::Index>(all[a].k), static_cast<Eigen::Index>(all[b].k)) += w * d[a] * d[b];
-        }
-      for (std::size_t a = 0; a < all.size(); ++a) {
-        if (!terms.is_cubic_damping(all[a].k)) continue;
-        // Var(v̂³ − 3σ²v̂) has the unbiased estimate 9σ²v̂⁴ − 36σ⁴v̂² + 15σ⁶; the square of d lacks −18σ⁴v̂² + 6σ⁶.
-        const double v2 = state.velocity * state.velocity, s = sigma[static_cast<int>(Input::kVelocity)],
-                     s2 = s * s;
-        const auto k = static_cast<Eigen::Index>(all[a].k);
-        out(k, k) += w * (-18.0 * s2 * s2 * v2 + 6.0 * s2 * s2 * s2);
-      }
+        for (std::size_t b = 0; b < all.size(); ++b)
+          if (all[a].input == all[b].input && (general(all[a]) || general(all[b])))
+            out(static_cast<Eigen::Index>(all[a].k), static_cast<Eigen::Index>(all[b].k)) += w * d[a] * d[b];
     }
   }
   return out;

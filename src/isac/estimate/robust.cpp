@@ -193,8 +193,8 @@ RobustSolution solve(const RobustProblem& problem, const Eigen::VectorXd& start)
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
   options.max_num_iterations = 200;
-  options.function_tolerance = 1e-15;
-  options.gradient_tolerance = 1e-16;
+  options.function_tolerance = 1e-30;
+  options.gradient_tolerance = 1e-30;
   options.parameter_tolerance = 1e-12;
   options.initial_trust_region_radius = 1e16;  // least squares problems begin with the full Gauss–Newton step
   options.logging_type = ceres::SILENT;

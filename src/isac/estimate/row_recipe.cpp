@@ -37,7 +37,7 @@ StatedRecipe choose_recipe(std::span<const JointRun> runs, const JointTerms& ter
     }
     if (careful && !run.delta_pressure.empty() && terms.reads(Input::kDeltaPressure) &&
         !std::isfinite(options.noise.delta_pressure))
-      pressure_noise.push_back(series::choose_window(run.time, run.delta_pressure, recipe.order).noise);
+      pressure_noise.push_back(series::sample_noise(run.time, run.delta_pressure, recipe.order));
   }
   if (recipe.window == 0) recipe.window = std::max(narrowest, 5);
   if (careful) {

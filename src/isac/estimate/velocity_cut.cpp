@@ -12,11 +12,13 @@ namespace isac::estimate {
 namespace {
 
 struct Passage {
-  double velocity, torque;
+  double velocity, cube, torque;  ///< means of v and v³, median torque
 };
 
 /// Passages through the middle at nearly constant speed.
-std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& offset, double half_width) {
+std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& offset,
+                              const std::vector<double>& cube, const std::vector<double>& linear,
+                              double half_width) {
   std::vector<Passage> out;
   const std::vector<double>& angle = rows.input[static_cast<int>(Input::kAngle)];
   const std::vector<double>& velocity = rows.input[static_cast<int>(Input::kVelocity)];
@@ -25,13 +27,14 @@ std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& 
     for (std::size_t i = run.begin; i < run.end; ++i) {
       if (std::abs(angle[i]) > half_width) continue;
       std::size_t end = i;
-      double low = velocity[i], high = velocity[i], sum = 0;
+      double low = velocity[i], high = velocity[i], sum = 0, cubes = 0;
       torque.clear();
       while (end < run.end && std::abs(angle[end]) <= half_width &&
              (end == i || rows.time[end] - rows.time[end - 1] <= 2.5 * run.interval)) {
         low = std::min(low, velocity[end]);
         high = std::max(high, velocity[end]);
-        sum += velocity[end];
+        sum += linear[end];
+        cubes += cube[end];
         torque.push_back(offset[end]);
         ++end;
       }
@@ -39,7 +42,8 @@ std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& 
       const bool steady = high - low <= 0.2 * std::abs(mean);
       const bool through = end > i + 2 && (angle[end - 1] - angle[i]) * mean > 0 &&
                            std::abs(angle[end - 1] - angle[i]) > half_width;
-      if (steady && through) out.push_back({mean, series::median(torque)});
+      if (steady && through)
+        out.push_back({mean, cubes / static_cast<double>(end - i), series::median(torque)});
       i = end;
     }
   }
@@ -54,18 +58,30 @@ VelocityCut velocity_cut(const JointRows& rows, const JointTerms& terms, const E
   cut.C.unit = "N m s3";
   cut.D.name = "D";
   cut.D.unit = "N m s";
-  Eigen::VectorXd others = theta;
-  for (std::size_t k = 0; k < terms.linear().size(); ++k)
-    if (terms.is_cubic_damping(k) || terms.is_viscous_damping(k)) others[static_cast<Eigen::Index>(k)] = 0.0;
-  std::vector<double> offset = predict(rows, terms, others);
-  for (std::size_t i = 0; i < offset.size(); ++i) offset[i] = rows.output[i] - offset[i];
+  // Filtered columns where there are some: torque and speed have then lost the same at the peak of the speed.
+  std::vector<double> offset = rows.y(), cube(rows.size(), 0.0), linear(rows.size(), 0.0);
+  for (std::size_t k = 0; k < terms.linear().size(); ++k) {
+    const std::vector<double>& x = rows.x(k);
+    const double value = theta[static_cast<Eigen::Index>(k)];
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (terms.is_cubic_damping(k))
+        cube[i] = -x[i];
+      else if (terms.is_viscous_damping(k))
+        linear[i] = -x[i];
+      else
+        offset[i] -= value * x[i];
+    }
+  }
+  if (!terms.nonlinear().empty())
+    for (std::size_t i = 0; i < offset.size(); ++i)
+      offset[i] -= terms.nonlinear_value(rows.state(i), theta.data() + terms.linear().size(), nullptr);
   double reach = 0;
   if (rows.size() > 0) {
     std::vector<double> size = rows.input[static_cast<int>(Input::kAngle)];
     for (double& v : size) v = std::abs(v);
     reach = series::quantile(size, 0.99);
   }
-  const std::vector<Passage> points = passages(rows, offset, 0.1 * reach);
+  const std::vector<Passage> points = passages(rows, offset, cube, linear, 0.1 * reach);
   const auto refuse = [&](const std::string& reason) {
     for (Estimated* e : {&cut.C, &cut.D}) {
       e->identifiable = false;
@@ -99,31 +115,31 @@ VelocityCut velocity_cut(const JointRows& rows, const JointTerms& terms, const E
     cut.std_error.push_back(std::sqrt(std::max(0.0, square / count - mean * mean) / (count - 1.0)));
   }
   const auto n = static_cast<Eigen::Index>(points.size());
-  Eigen::MatrixXd x(n, 2);
+  Eigen::MatrixXd x(n, 3);  // the constant takes up an offset of the sensors, which has no direction
   Eigen::VectorXd y(n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double v = points[static_cast<std::size_t>(i)].velocity;
-    x(i, 0) = -v * v * v;
-    x(i, 1) = -v;
+    x(i, 0) = -points[static_cast<std::size_t>(i)].cube;
+    x(i, 1) = -points[static_cast<std::size_t>(i)].velocity;
+    x(i, 2) = 1.0;
     y[i] = points[static_cast<std::size_t>(i)].torque;
   }
-  const Eigen::Vector2d scale = x.colwise().norm().cwiseInverse();
+  const Eigen::Vector3d scale = x.colwise().norm().cwiseInverse();
   x = x * scale.asDiagonal();
-  const Eigen::Matrix2d inverse = (x.transpose() * x).inverse();
+  const Eigen::Matrix3d inverse = (x.transpose() * x).inverse();
   if (!inverse.allFinite() || inverse.diagonal().maxCoeff() > 1e6) {
     refuse("all passages have the same speed; record passages from slow to 6.28 rad/s");
     return cut;
   }
-  const Eigen::Vector2d fit = inverse * (x.transpose() * y);
-  Eigen::Matrix2d meat = Eigen::Matrix2d::Zero();
+  const Eigen::Vector3d fit = inverse * (x.transpose() * y);
+  Eigen::Matrix3d meat = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < n; ++i) {
-    const Eigen::Vector2d row = x.row(i);
+    const Eigen::Vector3d row = x.row(i);
     const double leverage = std::min(0.99, row.dot(inverse * row));
     const double residual = (y[i] - row.dot(fit)) / (1.0 - leverage);
     meat += residual * residual * row * row.transpose();
   }
-  const Eigen::Matrix2d covariance = inverse * meat * inverse;
-  const double limit = series::student_t_limit(0.95, static_cast<double>(n) - 2.0);
+  const Eigen::Matrix3d covariance = inverse * meat * inverse;
+  const double limit = series::student_t_limit(0.95, static_cast<double>(n) - 3.0);
   Estimated* estimates[2] = {&cut.C, &cut.D};
   for (int k = 0; k < 2; ++k) {
     estimates[k]->value = fit[k] * scale[k];

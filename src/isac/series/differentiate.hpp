@@ -92,6 +92,10 @@ struct WindowChoice {
 [[nodiscard]] WindowChoice choose_window(std::span<const double> time, std::span<const double> signal,
                                          int order = 3,
                                          double known_noise = std::numeric_limits<double>::quiet_NaN(),
-                                         double max_seconds = 0.2);
+                                         double max_seconds = 0.1);
+
+/// White noise of one sample: robust residual of the narrowest window that interpolates nothing.
+[[nodiscard]] double sample_noise(std::span<const double> time, std::span<const double> signal,
+                                  int order = 3);
 
 }  // namespace isac::series

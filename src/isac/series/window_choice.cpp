@@ -9,7 +9,7 @@ namespace isac::series {
 namespace {
 
 constexpr std::size_t kChunk = 256;
-constexpr std::size_t kMostChunks = 256;
+constexpr std::size_t kMostChunks = 96;
 
 /// Root mean square of the smoothing residual in each chunk, over sqrt(1 − h) so that white noise gives its
 /// own size.
@@ -66,25 +66,39 @@ double quantisation_step(std::span<const double> signal, std::span<const Segment
   return large >= 16 && static_cast<double>(whole) > 0.98 * static_cast<double>(large) ? step : 0.0;
 }
 
+/// Stretches of 256 rows, spread over the record.
+std::vector<Segment> spread_chunks(std::span<const double> time, std::span<const double> signal) {
+  std::vector<Segment> chunks;
+  for (const Segment& segment : split_at_gaps(time, signal))
+    for (std::size_t b = segment.begin; b + kChunk <= segment.end; b += kChunk)
+      chunks.push_back({b, b + kChunk});
+  if (chunks.size() <= kMostChunks) return chunks;
+  std::vector<Segment> some;
+  for (std::size_t k = 0; k < kMostChunks; ++k) some.push_back(chunks[k * chunks.size() / kMostChunks]);
+  return some;
+}
+
+int narrowest_window(int order) {
+  return order + 2 + (order + 1) % 2;
+}  // odd, one more than interpolation
+
 }  // namespace
+
+double sample_noise(std::span<const double> time, std::span<const double> signal, int order) {
+  const std::vector<Segment> chunks = spread_chunks(time, signal);
+  if (chunks.empty()) return std::numeric_limits<double>::quiet_NaN();
+  return median(chunk_residuals(time, signal, chunks, {.window = narrowest_window(order), .order = order}));
+}
 
 WindowChoice choose_window(std::span<const double> time, std::span<const double> signal, int order,
                            double known_noise, double max_seconds) {
   WindowChoice choice;
   choice.polynomial.order = order;
-  const int smallest = order + 2 + (order + 1) % 2;  // odd, one more than interpolation
+  const int smallest = narrowest_window(order);
   choice.polynomial.window = smallest;
   const double interval = median_interval(time);
-  std::vector<Segment> chunks;
-  for (const Segment& segment : split_at_gaps(time, signal))
-    for (std::size_t b = segment.begin; b + kChunk <= segment.end; b += kChunk)
-      chunks.push_back({b, b + kChunk});
+  const std::vector<Segment> chunks = spread_chunks(time, signal);
   if (chunks.empty()) return choice;
-  if (chunks.size() > kMostChunks) {
-    std::vector<Segment> some;
-    for (std::size_t k = 0; k < kMostChunks; ++k) some.push_back(chunks[k * chunks.size() / kMostChunks]);
-    chunks = some;
-  }
   choice.step = quantisation_step(signal, chunks);
   const LocalPolynomial narrow{.window = smallest, .order = order};
   if (std::isfinite(known_noise) && known_noise > 0) {
