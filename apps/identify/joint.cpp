@@ -222,9 +222,9 @@ int run_joint(const Call& call, const std::string& json_path) {
   const record::ReadOptions reading{
       .map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};
   std::vector<estimate::JointRun> runs, heldout;
-  std::vector<series::Recording> recordings = read_all(files.runs, reading);
+  std::vector<series::Recording> recordings;
   Warnings left_out;
-  for (const series::Recording& recording : recordings) {
+  for (series::Recording& recording : read_all(files.runs, reading)) {
     if (recording.meta("experiment") == "pcu-step" && files.runs.size() > 1) {
       left_out.push_back({"run_left_out", short_name(recording.source) +
                                               " holds valve steps: use it with isac-identify pcu."});
@@ -233,6 +233,7 @@ int run_joint(const Call& call, const std::string& json_path) {
     runs.push_back(joint_run(recording, signals));
     if (options.output_unit.empty()) options.output_unit = recording.column(signals.output).unit;
     if (signals.position != "angle") options.position_unit = recording.column(signals.position).unit;
+    recordings.push_back(std::move(recording));
   }
   for (const series::Recording& recording : read_all(files.heldout, reading)) {
     if (recording.meta("experiment") == "pcu-step") continue;

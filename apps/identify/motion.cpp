@@ -33,7 +33,7 @@ struct Call {
   std::vector<std::string> runs, maps, holds;
   std::string rig, params, report, gravity;
   double friction_speed = 0.05, dead_time = 0;
-  bool from_rest = false;
+  bool from_rest = false, linear = false;
 };
 
 constexpr std::array<const char*, estimate::kMotionParameters> kKeys{"inertia",          "A",  "B", "C", "D",
@@ -83,6 +83,7 @@ int run_motion(const Call& call, const std::string& json_path) {
   options.friction_speed = call.friction_speed;
   options.dead_time = call.dead_time;
   options.initial_rest = call.from_rest;
+  options.command_linear = call.linear;
   if (!call.gravity.empty())
     options.gravity_torque = parse_quantity(call.gravity, dimension::kTorque, "--gravity");
 
@@ -171,6 +172,8 @@ Body add_motion(CLI::App& program, std::string& json_path) {
       ->capture_default_str();
   sub->add_option("--dead-time", call->dead_time, "known dead time of the valve unit, s")
       ->check(CLI::NonNegativeNumber);
+  sub->add_flag("--linear-command", call->linear,
+                "the command is linear between its samples (default: held, as a controller's)");
   sub->add_flag("--from-rest", call->from_rest, "every run starts at angle, speed and pressure zero");
   sub->add_option("--map", call->maps, "foreign column, e.g. delta_pressure_cmd=u:Pa");
   sub->add_option("-o,--params", call->params, "params.toml to write or update");

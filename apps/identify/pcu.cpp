@@ -27,7 +27,7 @@ namespace {
 
 struct Call {
   std::vector<std::string> runs, maps;
-  std::string rig, params, report, step_size, label = "valve unit";
+  std::string rig, params, report, step_size, label;
   double step_at = std::nan("");
 };
 
@@ -89,12 +89,14 @@ int run_pcu(const Call& call, const std::string& json_path) {
       .map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};
   const auto recordings = read_all(files.runs, reading);
   std::vector<estimate::PcuRun> runs;
+  std::vector<series::Recording> used;
   for (const series::Recording& recording : recordings) {
     // A dataset folder holds other sweeps too; steps of the valves are those that say so, or all where none
     // says what it is.
     const std::string experiment = recording.meta("experiment");
     if (recordings.size() > 1 && !experiment.empty() && experiment != "pcu-step") continue;
     for (auto& channel : channels_of(recording, call)) runs.push_back(std::move(channel));
+    used.push_back(recording);
   }
   if (runs.empty()) {
     throw Error(ErrorKind::kAnswerIsNo, "no_usable_data",
@@ -113,7 +115,7 @@ int run_pcu(const Call& call, const std::string& json_path) {
     section.name = "pcu";
     section.label = call.label;
     section.values = fit.parameters;
-    section.sources = sources_of(recordings);
+    section.sources = sources_of(used);
     record::Params params;
     params.created = now_iso8601();
     params.sections.push_back(std::move(section));
@@ -153,7 +155,8 @@ Body add_pcu(CLI::App& program, std::string& json_path) {
   sub->add_option("--map", call->maps, "foreign column, e.g. p1=\"p_G\":kPa");
   sub->add_option("--step-at", call->step_at, "time of the step in seconds where no command was recorded");
   sub->add_option("--step-size", call->step_size, "size of that step, e.g. \"5 kg/cm2\"");
-  sub->add_option("--label", call->label, "name of the valve unit in params.toml")->capture_default_str();
+  sub->add_option("--label", call->label,
+                  "joint the valve unit belongs to, as in params.toml (default: all joints)");
   sub->add_option("-o,--params", call->params, "params.toml to write or update");
   sub->add_option("--report", call->report, "HTML report to write");
   sub->add_option("--json", json_path, "answer as JSON into a file, - for standard output");

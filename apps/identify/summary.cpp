@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace isac::apps {
 
@@ -20,7 +22,16 @@ void print_parameters(const std::vector<Estimated>& parameters) {
 }
 
 void print_warnings(const Warnings& warnings) {
-  for (const Warning& warning : warnings) fmt::print("! {}\n", warning.text);
+  constexpr std::ptrdiff_t kMost =
+      2;  // of one kind; the rest is counted, and stands in the report and the JSON
+  for (std::size_t i = 0; i < warnings.size(); ++i) {
+    const auto same = [&](const Warning& other) { return other.code == warnings[i].code; };
+    const auto here = warnings.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto before = std::count_if(warnings.begin(), here, same);
+    const auto all = std::count_if(warnings.begin(), warnings.end(), same);
+    if (before < kMost) fmt::print("! {}\n", warnings[i].text);
+    if (before + 1 == kMost && all > kMost) fmt::print("! … and {} more like it\n", all - kMost);
+  }
 }
 
 nlohmann::ordered_json json_number(double value) {

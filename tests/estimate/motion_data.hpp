@@ -60,6 +60,7 @@ inline MotionRun make_run(const Truth& truth, unsigned seed, double seconds, dou
 
 inline MotionOptions options_for(const Truth& truth) {
   MotionOptions options;
+  options.command_linear = true;  // the command above is smooth between its samples
   options.wheel_radius = truth.radius;
   options.gravity_torque = truth.gravity;
   options.friction_speed = truth.friction_speed;

@@ -85,6 +85,22 @@ TEST(MotionFit, recovers_the_seeds_joint_from_command_and_angle_without_a_start)
   EXPECT_EQ(fit.parameters[kInertia].std_error, 0) << "held";
 }
 
+TEST(MotionFit, a_held_command_is_delayed_exactly_by_any_dead_time) {
+  MotionOptions options;
+  options.dead_time = 0.0137;  // no multiple of the interval
+  MotionRun run;
+  for (int k = 0; k < 100; ++k) {
+    run.time.push_back(0.01 * k);
+    run.command.push_back(k < 20 ? 1.0 : 3.0);
+    run.angle.push_back(0);
+  }
+  const motion::Prepared ready = motion::prepare(run, options);
+  // The step of 0.20 s arrives at 0.2137 s: the interval from 0.21 s holds the old value for 37 % of its length.
+  EXPECT_NEAR(ready.command_from[20], 1.0, 1e-12);
+  EXPECT_NEAR(ready.command_from[21], 0.37 * 1.0 + 0.63 * 3.0, 1e-9);
+  EXPECT_NEAR(ready.command_to[22], 3.0, 1e-12);
+}
+
 TEST(MotionFit, refuses_every_torque_when_nothing_fixes_their_scale) {
   const Truth truth;
   MotionOptions options = options_for(truth);

@@ -7,7 +7,7 @@
 ///
 /// The sum of torques is known from the motion only up to a common factor: without a known gravity torque G one of I, A, B
 /// must be held (the inertia, by default the one in rig.toml), else all of them are refused by name.
-/// Integration: classical Runge-Kutta at the samples (or finer), the command taken as linear between them; sensitivities of that
+/// Integration: classical Runge-Kutta at the samples (or finer), the command held between them as a controller's output is (or linear, on request); sensitivities of that
 /// very recursion are carried along, so the Jacobian is exact for the discrete solution. Cost: one pass per iteration; the normal
 /// equations are summed on the way, nothing is stored per row.
 /// Covariance: sandwich over blocks of time, Student's t. Intervals hold under coloured measurement noise.
@@ -50,6 +50,8 @@ struct MotionOptions {
     return v;
   }();
   std::array<bool, kMotionParameters> fixed{};  ///< held at `start`
+  bool command_linear =
+      false;  ///< false: every command holds until the next sample, as a controller's output does
   bool initial_rest = false;  ///< φ(t0) = φ̇(t0) = 0 exactly; else both are fitted for every run
   double max_step = 0.002;    ///< s, longest step of the integration
   double block_seconds = std::numeric_limits<double>::quiet_NaN();

@@ -143,9 +143,9 @@ ISAC_SIMD bool predict_rows(const Prepared& run, const Constants& k, Point x, do
     if (i + 1 == n) break;
     const int pieces = run.substeps[i];
     const double h = (run.time[i + 1] - run.time[i]) / pieces;
-    const double slope = (run.command[i + 1] - run.command[i]) / pieces;
+    const double from = run.command_from[i], slope = (run.command_to[i] - from) / pieces;
     for (int piece = 0; piece < pieces; ++piece) {
-      x = step(k, x, h, run.command[i] + piece * slope, run.command[i] + (piece + 1) * slope);
+      x = step(k, x, h, from + piece * slope, from + (piece + 1) * slope);
     }
     if (!sane(x)) return false;
   }
@@ -172,14 +172,56 @@ ISAC_SIMD bool accumulate_rows(const Prepared& run, const Constants& k, Point x,
     if (i + 1 == n) break;
     const int pieces = run.substeps[i];
     const double h = (run.time[i + 1] - run.time[i]) / pieces;
-    const double slope = (run.command[i + 1] - run.command[i]) / pieces;
+    const double from = run.command_from[i], slope = (run.command_to[i] - from) / pieces;
     for (int piece = 0; piece < pieces; ++piece) {
-      x = step_with_lanes(k, x, s, h, run.command[i] + piece * slope, run.command[i] + (piece + 1) * slope);
+      x = step_with_lanes(k, x, s, h, from + piece * slope, from + (piece + 1) * slope);
     }
     if (!sane(x)) return false;
   }
   return true;
 }
+
+}  // namespace
+
+namespace {
+
+/// Reads a sampled command at increasing times.
+class CommandReader {
+ public:
+  CommandReader(const std::vector<double>& times, const std::vector<double>& values)
+      : times_(times), values_(values) {}
+
+  double linear_at(double time) {
+    seek(time);
+    if (time <= times_[at_] || at_ + 1 == times_.size()) return values_[at_];
+    const double part = (time - times_[at_]) / (times_[at_ + 1] - times_[at_]);
+    return values_[at_] + part * (values_[at_ + 1] - values_[at_]);
+  }
+
+  /// Mean over [begin, end] of the command that holds between its samples: exact where L is no multiple of the interval.
+  double held_mean(double begin, double end) {
+    seek(begin);
+    if (!(end > begin)) return values_[at_];
+    double sum = 0, from = begin;
+    for (std::size_t k = at_; from < end; ++k) {
+      const double until = k + 1 < times_.size() ? std::min(times_[k + 1], end) : end;
+      sum += values_[k] * (until - from);
+      from = until;
+      if (k + 1 == times_.size()) break;
+    }
+    return sum / (end - begin);
+  }
+
+ private:
+  void seek(double time) {
+    while (at_ > 0 && times_[at_] > time) --at_;
+    while (at_ + 1 < times_.size() && times_[at_ + 1] <= time) ++at_;
+  }
+
+  const std::vector<double>& times_;
+  const std::vector<double>& values_;
+  std::size_t at_ = 0;
+};
 
 }  // namespace
 
@@ -191,7 +233,7 @@ Prepared prepare(const MotionRun& run, const MotionOptions& options) {
     ready.angle.push_back(run.angle[i]);
     ready.source_row.push_back(i);
   }
-  // The command at t − L: linear between its samples, held at the ends, missing samples bridged.
+  // The command at t − L; missing samples are bridged, the ends held.
   std::vector<double> times, values;
   for (std::size_t i = 0; i < run.time.size(); ++i) {
     if (!std::isfinite(run.time[i]) || !std::isfinite(run.command[i])) continue;
@@ -199,16 +241,18 @@ Prepared prepare(const MotionRun& run, const MotionOptions& options) {
     values.push_back(run.command[i]);
   }
   if (times.empty()) return {};
-  ready.command.reserve(ready.time.size());
-  std::size_t at = 0;
-  for (const double time : ready.time) {
-    const double wanted = time - options.dead_time;
-    while (at + 1 < times.size() && times[at + 1] <= wanted) ++at;
-    double value = values[at];
-    if (wanted > times[at] && at + 1 < times.size()) {
-      value += (values[at + 1] - values[at]) * (wanted - times[at]) / (times[at + 1] - times[at]);
+  CommandReader reader(times, values);
+  for (std::size_t i = 0; i < ready.time.size(); ++i) {
+    const double begin = ready.time[i] - options.dead_time;
+    const double end = (i + 1 < ready.time.size() ? ready.time[i + 1] : ready.time[i]) - options.dead_time;
+    if (options.command_linear) {
+      ready.command_from.push_back(reader.linear_at(begin));
+      ready.command_to.push_back(reader.linear_at(end));
+    } else {
+      const double mean = reader.held_mean(begin, end);
+      ready.command_from.push_back(mean);
+      ready.command_to.push_back(mean);
     }
-    ready.command.push_back(value);
   }
   for (std::size_t i = 0; i + 1 < ready.time.size(); ++i) {
     const double pieces = std::ceil((ready.time[i + 1] - ready.time[i]) / options.max_step - 1e-9);
@@ -218,13 +262,13 @@ Prepared prepare(const MotionRun& run, const MotionOptions& options) {
 }
 
 bool predict(const Prepared& run, const State& state, const MotionOptions& options, double* angles) {
-  const double q = options.initial_rest ? 0.0 : run.command.front();
+  const double q = options.initial_rest ? 0.0 : run.command_from.front();
   return predict_rows(run, constants_of(state.parameters, options), {state.angle, state.speed, q}, angles);
 }
 
 bool accumulate(const Prepared& run, const State& state, const MotionOptions& options, std::size_t block_rows,
                 std::vector<Sums>& blocks) {
-  const double q = options.initial_rest ? 0.0 : run.command.front();
+  const double q = options.initial_rest ? 0.0 : run.command_from.front();
   return accumulate_rows(run, constants_of(state.parameters, options), {state.angle, state.speed, q},
                          block_rows == 0 ? run.time.size() + 1 : block_rows, blocks);
 }

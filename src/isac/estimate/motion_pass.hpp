@@ -20,7 +20,8 @@ inline constexpr int kInitialAngle = 7, kInitialSpeed = 8, kUsedLanes = 9;
 
 /// A run made ready: only rows with a number in every column, steps fine enough.
 struct Prepared {
-  std::vector<double> time, command, angle;
+  std::vector<double> time, angle;
+  std::vector<double> command_from, command_to;  ///< at the two ends of the interval that begins at the row
   std::vector<std::size_t> source_row;
   std::vector<int> substeps;  ///< of the interval that begins at the row
 };

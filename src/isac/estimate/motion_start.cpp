@@ -40,12 +40,12 @@ Smooth smooth(const Prepared& run) {
 }
 
 std::vector<double> lagged(const Prepared& run, double lag, bool from_zero) {
-  std::vector<double> q(run.command.size());
-  double value = from_zero ? 0.0 : run.command.front();
+  std::vector<double> q(run.time.size());
+  double value = from_zero ? 0.0 : run.command_from.front();
   q[0] = value;
   for (std::size_t i = 1; i < q.size(); ++i) {
     const double keep = std::exp(-(run.time[i] - run.time[i - 1]) / lag);
-    value = keep * value + (1 - keep) * 0.5 * (run.command[i] + run.command[i - 1]);
+    value = keep * value + (1 - keep) * 0.5 * (run.command_from[i - 1] + run.command_to[i - 1]);
     q[i] = value;
   }
   return q;
