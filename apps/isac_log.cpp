@@ -18,6 +18,7 @@
 #include "isac/runtime/log_session.hpp"
 #include "isac/runtime/progress.hpp"
 #include "isac/runtime/stop_signals.hpp"
+#include "log/answer.hpp"
 
 namespace {
 
@@ -209,7 +210,7 @@ int log_sweeps(const Words& words, const Given& given) {
   console.erase();
   fmt::print(out, "{}\n", runtime::summary_line(outcomes, session.programs.size()));
   const bool complete = outcomes.size() == session.programs.size();
-  if (!words.json.empty()) apps::write_text(words.json, runtime::format_outcomes(outcomes, complete));
+  if (!words.json.empty()) apps::write_text(words.json, apps::format_outcomes(outcomes, complete));
   bool keep = complete;
   for (const runtime::RecordingOutcome& outcome : outcomes) keep = keep && outcome.verdict.keep();
   return keep ? 0 : 1;

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
 #include "isac/core/units.hpp"
 
 namespace isac::runtime {
@@ -67,19 +65,6 @@ TEST(Progress, says_keep_or_repeat_and_why) {
   EXPECT_EQ(summary_line({outcome(true)}, 1), "1 recording made, 1 to keep.");
   EXPECT_EQ(summary_line({outcome(true), outcome(false)}, 3),
             "2 recordings made, 1 to keep; repeat run.csv (with --overwrite); 1 of 3 not made.");
-}
-
-TEST(LogAnswer, is_json_with_null_for_what_is_not_known) {
-  const auto answer = nlohmann::json::parse(format_outcomes({outcome(true), outcome(false)}, true));
-  EXPECT_EQ(answer["schema"], "isac.log/1");
-  EXPECT_EQ(answer["verdict"], "repeat");
-  EXPECT_EQ(answer["recordings"][0]["verdict"], "keep");
-  EXPECT_EQ(answer["recordings"][1]["remarks"][1]["code"], "speed_too_low");
-  EXPECT_EQ(answer["recordings"][0]["facts"]["speed"]["high"], 5.5);
-  EXPECT_TRUE(answer["recordings"][0]["facts"]["force"]["low"].is_null());
-  EXPECT_EQ(nlohmann::json::parse(format_outcomes({outcome(true)}, false))["verdict"],
-            "repeat");  // cut short
-  EXPECT_EQ(nlohmann::json::parse(format_outcomes({outcome(true)}, true))["verdict"], "keep");
 }
 
 }  // namespace

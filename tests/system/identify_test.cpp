@@ -30,7 +30,7 @@ json fit(const std::vector<std::string>& words, int expected_exit = 0) {
   std::vector<std::string> call{"isac-identify"};
   call.insert(call.end(), words.begin(), words.end());
   call.insert(call.end(), {"--json", "-"});
-  const Run run = run_program(call);
+  const auto run = run_program(call);
   EXPECT_EQ(run.exit_code, expected_exit) << run.out << run.err;
   const json answer = json::parse(run.out, nullptr, false);
   EXPECT_FALSE(answer.is_discarded()) << run.out << run.err;
@@ -197,7 +197,7 @@ TEST(Export, tables_are_accepted_whole_and_refused_when_a_bit_flips) {
     std::string broken = bytes;
     broken[at] = static_cast<char>(broken[at] ^ 0x10);
     std::ofstream(folder / "broken.bin", std::ios::binary) << broken;
-    const Run run = run_program({"isac-identify", "export", "--verify", folder / "broken.bin"});
+    const auto run = run_program({"isac-identify", "export", "--verify", folder / "broken.bin"});
     EXPECT_EQ(run.exit_code, 3) << "byte " << at;
     EXPECT_NE(run.err.find("refuses"), std::string::npos);
   }
@@ -217,7 +217,9 @@ TEST(Diff, tells_a_real_change_from_noise) {
   EXPECT_TRUE(changed["significant"].get<bool>());
   for (const json& change : changed["changes"]) {
     const bool is_damping = change["name"].get<std::string>().find(": D") != std::string::npos;
-    if (is_damping) EXPECT_TRUE(change["significant"].get<bool>()) << change.dump();
+    if (is_damping) {
+      EXPECT_TRUE(change["significant"].get<bool>()) << change.dump();
+    }
   }
   EXPECT_FALSE(same["significant"].get<bool>()) << same.dump(1);
 }
@@ -226,7 +228,7 @@ TEST(Check, draws_what_cannot_be_fitted_and_goes_on_behind_a_bad_file) {
   const ScratchFolder folder;
   std::ofstream(folder / "odd.csv") << "time [s],temperature [degC],mystery\n0,20,1\n1,21,2\n2,nan,3\n";
   std::ofstream(folder / "bad.csv") << "time [s],angle [Pa]\n0,1\n";
-  const Run run = run_program(
+  const auto run = run_program(
       {"isac-identify", "check", folder / "bad.csv", folder / "odd.csv", "--report", folder / "r.html"});
   EXPECT_EQ(run.exit_code, 3);
   EXPECT_NE(run.err.find("bad.csv:1"), std::string::npos) << run.err;
@@ -266,7 +268,7 @@ TEST(Errors, are_one_sentence_with_the_right_exit_code_and_leave_nothing_behind)
     words.insert(words.end(), {"--report", folder / "must_not_exist.html"});
     if (c.words[0] == "export" || c.words[0] == "diff" || c.words[0] == "dance")
       words.resize(words.size() - 2);
-    const Run run = run_program(words);
+    const auto run = run_program(words);
     std::string joined;
     for (const std::string& word : words) joined += word + " ";
     EXPECT_EQ(run.exit_code, c.exit_code) << joined << "\n" << run.err;
@@ -275,7 +277,7 @@ TEST(Errors, are_one_sentence_with_the_right_exit_code_and_leave_nothing_behind)
     EXPECT_FALSE(fs::exists(folder.path() / "must_not_exist.html")) << joined;
     // The same with --json: an error object on standard output, nothing on standard error.
     words.insert(words.end(), {"--json", "-"});
-    const Run with_json = run_program(words);
+    const auto with_json = run_program(words);
     EXPECT_EQ(with_json.exit_code, c.exit_code) << joined;
     const json error = json::parse(with_json.out, nullptr, false);
     ASSERT_FALSE(error.is_discarded()) << joined << with_json.out;
@@ -298,7 +300,7 @@ TEST(Errors, a_full_disk_loses_nothing_that_was_there) {
   rlimit tight = old_limit;
   tight.rlim_cur = 4096;
   setrlimit(RLIMIT_FSIZE, &tight);
-  const Run run = run_program({"isac-identify", "joint", folder / "data", "--report", folder / "r.html"});
+  const auto run = run_program({"isac-identify", "joint", folder / "data", "--report", folder / "r.html"});
   setrlimit(RLIMIT_FSIZE, &old_limit);
   EXPECT_EQ(run.exit_code, 3) << run.err;
   EXPECT_FALSE(fs::exists(folder.path() / "r.html"));

@@ -67,7 +67,4 @@ class SessionObserver {
                                                         SessionObserver& observer,
                                                         const std::atomic<bool>& stop);
 
-/// {"schema":"isac.log/1","verdict":"keep"|"repeat","recordings":[{"file":…,"verdict":…,"facts":{…},"remarks":[…]},…]}
-[[nodiscard]] std::string format_outcomes(const std::vector<RecordingOutcome>& outcomes, bool complete);
-
 }  // namespace isac::runtime

@@ -1,10 +1,12 @@
+#include "log/answer.hpp"
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "isac/runtime/log_session.hpp"
-
-namespace isac::runtime {
+namespace isac::apps {
 namespace {
+
+using runtime::RecordingOutcome;
 
 using Json = nlohmann::ordered_json;
 
@@ -52,4 +54,4 @@ std::string format_outcomes(const std::vector<RecordingOutcome>& outcomes, bool 
   return answer.dump(2);
 }
 
-}  // namespace isac::runtime
+}  // namespace isac::apps
