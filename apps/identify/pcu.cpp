@@ -133,7 +133,9 @@ int run_pcu(const Call& call, const std::string& json_path) {
   if (!json_path.empty()) write_text(json_path, record::format_answer(answer, details_of(fit)));
   if (json_path != "-") {
     print_parameters(fit.parameters);
-    fmt::print("rmse {:.4g} Pa over {} rows of {} steps\n", fit.rmse, fit.samples, fit.steps.size());
+    if (fit.samples > 0) {
+      fmt::print("rmse {:.4g} Pa over {} rows of {} steps\n", fit.rmse, fit.samples, fit.steps.size());
+    }
     for (const estimate::PcuStep& step : fit.steps) {
       fmt::print("{} {}: {}\n", step.used && step.adequacy.first_order ? "·" : "!", step.run,
                  step.used ? step.adequacy.sentence : step.why_not);

@@ -57,8 +57,10 @@ TEST(Joint, recovers_the_seeds_testbed_from_the_sweeps_of_chapter_three) {
   EXPECT_EQ(answer["parameters"]["A"]["unit"], "N/m");
   EXPECT_EQ(answer["parameters"]["B"]["unit"], "N cm2/kg");
   EXPECT_EQ(answer["fit"]["unit"], "N m");
-  // White part of (F2 − F1) r: sqrt(2) · 0.3 N · 19 mm = 8 mN m; held-out runs must come down to it.
-  EXPECT_LT(answer["fit"]["heldout_rmse"].get<double>(), 1.3 * std::sqrt(2.0) * 0.3 * 0.019);
+  // White part of (F2 − F1) r: sqrt(2) · 0.3 N · 19 mm = 8 mN m; held-out runs must come down to it but for what the noise of
+  // the speed adds through the damping (up to 0.07 rad/s times 0.14 N m s in the fast runs).
+  EXPECT_LT(answer["fit"]["heldout_rmse"].get<double>(),
+            std::hypot(std::sqrt(2.0) * 0.3 * 0.019, 0.07 * 0.14));
   EXPECT_GT(fs::file_size(folder.path() / "report.html"), 20000u);
   const std::string params = read_text(folder / "params.toml");
   EXPECT_NE(params.find("isac.params/1"), std::string::npos);
@@ -182,6 +184,17 @@ TEST(Pcu, recovers_gain_and_lag_and_finds_a_dead_time) {
   EXPECT_TRUE(answer["first_order"].get<bool>());
 }
 
+TEST(Pcu, refuses_by_name_when_the_valves_never_step) {
+  const ScratchFolder folder;
+  write_sweep(folder / "sweep.csv", {}, chapter_three()[3], 4);
+  const json answer = fit({"pcu", folder / "sweep.csv"}, 1);
+  for (const char* name : {"K_C", "T_C", "dead_time"}) {
+    EXPECT_FALSE(answer["parameters"][name]["identifiable"].get<bool>()) << name;
+    EXPECT_TRUE(answer["parameters"][name]["value"].is_null()) << name;
+    EXPECT_FALSE(answer["parameters"][name]["reason"].get<std::string>().empty()) << name;
+  }
+}
+
 TEST(Export, tables_are_accepted_whole_and_refused_when_a_bit_flips) {
   const ScratchFolder folder;
   write_dataset(folder.path() / "data", {}, chapter_three(), 8);
@@ -256,7 +269,6 @@ TEST(Errors, are_one_sentence_with_the_right_exit_code_and_leave_nothing_behind)
       {{"joint", run_file, "--rig", rig, "--differentiator", "40:3"}, 2, "odd"},
       {{"joint", run_file, "--rig", rig, "-o", folder / "no/such/folder/p.toml"}, 2, "does not exist"},
       {{"joint", folder.path().string()}, 3, "no *.csv"},
-      {{"pcu", run_file}, 1, "step"},
       {{"muscle", run_file}, 3, "pressure"},
       {{"export", run_file}, 3, "fast_0.csv"},
       {{"diff", rig, rig}, 3, "rig.toml"},
