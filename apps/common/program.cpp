@@ -38,6 +38,18 @@ std::string json_path_of(int argc, char** argv) {
   return {};
 }
 
+/// What to say where CLI11 only knows that no subcommand was found.
+std::string unknown_subcommand(const CLI::App& app, int argc, char** argv) {
+  const auto known = app.get_subcommands([](const CLI::App*) { return true; });
+  if (known.empty() || argc < 2 || argv[1][0] == '-') return {};
+  std::string names;
+  for (const CLI::App* one : known) {
+    if (one->get_name() == argv[1]) return {};
+    names += (names.empty() ? "" : ", ") + one->get_name();
+  }
+  return "'" + std::string(argv[1]) + "' is none of " + names;
+}
+
 }  // namespace
 
 void write_text(const std::string& path, const std::string& text) {
@@ -82,7 +94,8 @@ int run_program(CLI::App& app, int argc, char** argv, const std::string& json_pa
     fmt::print("{}\n", version.what());
     return 0;
   } catch (const CLI::ParseError& wrong) {
-    std::string text = wrong.what();
+    std::string text = unknown_subcommand(app, argc, argv);
+    if (text.empty()) text = wrong.what();
     while (!text.empty() && (text.back() == '\n' || text.back() == '.')) text.pop_back();
     return report_error(app, Error(ErrorKind::kUsage, "usage", text + "; see --help"),
                         json_path_of(argc, argv));
