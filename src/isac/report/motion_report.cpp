@@ -29,9 +29,9 @@ Figure run_figure(const estimate::MotionRunResult& run, std::size_t index) {
   measured.size = 3;
   angle.curves = {std::move(measured), line("simulated", colour::kModel, run.time, run.predicted)};
   std::vector<double> rest(run.time.size());
-  for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = run.measured[i] - run.predicted[i];
+  for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = 1000 * (run.measured[i] - run.predicted[i]);
   Panel residual{
-      .x = angle.x, .y = {.label = "Residual", .unit = "rad"}, .lines = {{.at = 0}}, .height = 110};
+      .x = angle.x, .y = {.label = "Residual", .unit = "mrad"}, .lines = {{.at = 0}}, .height = 110};
   residual.curves = {line("", colour::kSecond, run.time, rest)};
   figure.panels = {std::move(angle), std::move(residual)};
   return figure;

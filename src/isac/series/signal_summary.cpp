@@ -35,10 +35,23 @@ SignalSummary summarise(const Column& column) {
   return summary;
 }
 
-/// Share of samples that sit exactly at the largest or the smallest value: a sensor at its stop repeats one number.
+/// Share of samples that sit exactly at `value`: a sensor at its stop repeats one number.
 double share_at(const Column& column, double value) {
   const auto same = std::count(column.values.begin(), column.values.end(), value);
   return static_cast<double>(same) / static_cast<double>(column.values.size());
+}
+
+/// Share of neighbours that are equal, away from `low` and `high`. A noisy sensor seldom repeats a reading; an encoder at rest
+/// and a held command do, and they stand at their extremes without any stop.
+double share_repeated(const Column& column, double low, double high) {
+  std::size_t pairs = 0, equal = 0;
+  for (std::size_t i = 1; i < column.values.size(); ++i) {
+    const double value = column.values[i];
+    if (!std::isfinite(value) || value == low || value == high) continue;
+    ++pairs;
+    equal += value == column.values[i - 1] ? 1 : 0;
+  }
+  return pairs == 0 ? 1.0 : static_cast<double>(equal) / static_cast<double>(pairs);
 }
 
 void remark_on_signal(const Column& column, const SignalSummary& summary, Warnings& remarks) {
@@ -59,13 +72,9 @@ void remark_on_signal(const Column& column, const SignalSummary& summary, Warnin
     }
     return;
   }
-  // A resting signal repeats values too; a stop is an extreme that a noisy signal takes again and again.
-  std::vector<double> distinct(column.values);
-  distinct.erase(std::remove_if(distinct.begin(), distinct.end(), [](double v) { return !std::isfinite(v); }),
-                 distinct.end());
-  std::sort(distinct.begin(), distinct.end());
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  if (distinct.size() < 50 || column.values.size() < 200) return;
+  constexpr double kNoisy =
+      0.3;  // of the neighbours equal at the most: 12-bit readings of a moving signal stay below a tenth
+  if (column.values.size() < 200 || share_repeated(column, summary.min, summary.max) > kNoisy) return;
   for (const double extreme : {summary.min, summary.max}) {
     const double share = share_at(column, extreme);
     if (share > 0.02) {
