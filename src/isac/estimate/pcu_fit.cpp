@@ -149,6 +149,19 @@ void set_dead_time(PcuStep& step, const StepFit& fit, const Window& w, Warnings&
   }
 }
 
+/// Every step of a fast valve says the same; one sentence is enough.
+void merge_dead_time_warnings(Warnings& warnings, std::size_t steps) {
+  const auto is_one = [](const Warning& w) { return w.code == "dead_time_below_sample"; };
+  const auto count = std::count_if(warnings.begin(), warnings.end(), is_one);
+  if (count < 2) return;
+  const auto first = std::find_if(warnings.begin(), warnings.end(), is_one);
+  first->text = fmt::format(
+      "in {} of {} steps the dead time is below one sample; the interval of such a step begins at 0 and is "
+      "at least one sample wide",
+      count, steps);
+  warnings.erase(std::remove_if(std::next(first), warnings.end(), is_one), warnings.end());
+}
+
 PcuStep fit_one(const PcuRun& run, const Window& w, const PcuFitOptions& options, std::vector<Tail>& tails,
                 PcuFit& total) {
   Warnings& warnings = total.warnings;
@@ -263,6 +276,7 @@ PcuFit fit_pcu(std::span<const PcuRun> runs, const PcuFitOptions& options) {
   }
   pool_steps(fit);
   remark(fit);
+  merge_dead_time_warnings(fit.warnings, fit.steps.size());
   return fit;
 }
 

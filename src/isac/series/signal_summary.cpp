@@ -54,7 +54,8 @@ double share_repeated(const Column& column, double low, double high) {
   return pairs == 0 ? 1.0 : static_cast<double>(equal) / static_cast<double>(pairs);
 }
 
-void remark_on_signal(const Column& column, const SignalSummary& summary, Warnings& remarks) {
+void remark_on_signal(const Column& column, const SignalSummary& summary, bool meant_to_rest,
+                      Warnings& remarks) {
   if (summary.missing == column.values.size()) {
     remarks.push_back({"signal_empty", column.name + " holds no number at all."});
     return;
@@ -66,7 +67,7 @@ void remark_on_signal(const Column& column, const SignalSummary& summary, Warnin
                                               " samples (" + text_of(percent) + " %) are missing."});
   }
   if (summary.min == summary.max) {
-    if (column.values.size() > 1) {
+    if (column.values.size() > 1 && !meant_to_rest) {
       remarks.push_back({"signal_constant", column.name + " never changes (" + text_of(summary.min) + " " +
                                                 summary.unit + ")."});
     }
@@ -92,7 +93,11 @@ RecordingSummary summarise(const Recording& recording) {
   for (const Column& column : recording.columns) {
     if (column.name == "time") continue;
     summary.signals.push_back(summarise(column));
-    remark_on_signal(column, summary.signals.back(), summary.remarks);
+    const bool is_command = column.name.size() > 4 && column.name.ends_with("_cmd");
+    const std::string experiment = recording.meta("experiment");
+    const bool clamped =
+        column.name == "angle" && (experiment == "constant-angle" || experiment == "pcu-step");
+    remark_on_signal(column, summary.signals.back(), is_command || clamped, summary.remarks);
   }
   const Column* time = recording.find("time");
   if (time == nullptr || time->values.size() < 2) return summary;
