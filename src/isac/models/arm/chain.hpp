@@ -88,6 +88,24 @@ template <class S, int N>
   return torque;
 }
 
+/// Derivative of gravity_per_kilogram by the angles: entry (j, l) = ∂τ_j/∂θ_l = g · (z_a × (z_b × (q − o_b))),
+/// a = min(j, l), b = max(j, l); symmetric, as the second derivative of the potential energy is.
+template <class S, int N>
+[[nodiscard]] std::array<JointVector<S, N>, static_cast<std::size_t>(N)> gravity_gradient_per_kilogram(
+    const Chain<S, N>& chain, const std::array<Transform<S>, static_cast<std::size_t>(N)>& frames,
+    int mass) noexcept {
+  std::array<JointVector<S, N>, static_cast<std::size_t>(N)> gradient{};
+  const PointMass<S>& point = chain.masses[static_cast<std::size_t>(mass)];
+  const auto columns = point_jacobian<S, N>(frames, point.link, point.position);
+  for (std::size_t b = 0; b <= static_cast<std::size_t>(point.link); ++b) {
+    for (std::size_t a = 0; a <= b; ++a) {
+      gradient[a][b] = dot(cross(frames[a].z_axis(), columns[b]), chain.gravity);
+      gradient[b][a] = gradient[a][b];
+    }
+  }
+  return gradient;
+}
+
 /// τ_g: the torque that gravity exerts on every joint; the actuators must give −τ_g to hold the arm.
 template <class S, int N>
 [[nodiscard]] JointVector<S, N> gravity_torque(const Chain<S, N>& chain,
