@@ -30,7 +30,7 @@ namespace isac::apps {
 namespace {
 
 struct Call {
-  std::vector<std::string> runs, maps, holds;
+  std::vector<std::string> runs, maps, holds, starts;
   std::string rig, params, report, gravity;
   double friction_speed = 0.05, dead_time = 0;
   bool from_rest = false, linear = false;
@@ -41,8 +41,8 @@ constexpr std::array<const char*, estimate::kMotionParameters> kKeys{"inertia", 
 constexpr std::array<double, estimate::kMotionParameters> kSiPerReported{1, 1, 1 / kPascalPerKgfCm2, 1, 1,
                                                                          1, 1};
 
-/// "inertia=0.0085" (reporting units of docs/notation.md) holds a parameter.
-void hold(const std::string& text, estimate::MotionOptions& options) {
+/// "inertia=0.0085" (reporting units of docs/notation.md) gives a parameter its start, and holds it there if `fixed`.
+void set_parameter(const std::string& text, bool fixed, estimate::MotionOptions& options) {
   const auto equals = text.find('=');
   const std::string key = text.substr(0, equals);
   const auto found = std::find(kKeys.begin(), kKeys.end(), key);
@@ -52,13 +52,13 @@ void hold(const std::string& text, estimate::MotionOptions& options) {
   if (found == kKeys.end() || !std::isfinite(value) || end == text.c_str() + equals + 1 || *end != '\0') {
     throw Error(
         ErrorKind::kUsage, "hold",
-        "--hold " + text +
+        (fixed ? "--hold " : "--start ") + text +
             " must be NAME=NUMBER with inertia (kg m2), A (N/m), B (N cm2/kg), C (N m s3), D (N m s), "
             "coulomb_friction (N m) or T_C (s)");
   }
   const auto index = static_cast<std::size_t>(found - kKeys.begin());
   options.start[index] = value * kSiPerReported[index];
-  options.fixed[index] = true;
+  options.fixed[index] = fixed;
 }
 
 estimate::MotionRun motion_run(const series::Recording& recording) {
@@ -79,7 +79,8 @@ estimate::MotionRun motion_run(const series::Recording& recording) {
 int run_motion(const Call& call, const std::string& json_path) {
   for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
   estimate::MotionOptions options;
-  for (const std::string& text : call.holds) hold(text, options);
+  for (const std::string& text : call.starts) set_parameter(text, false, options);
+  for (const std::string& text : call.holds) set_parameter(text, true, options);
   options.friction_speed = call.friction_speed;
   options.dead_time = call.dead_time;
   options.initial_rest = call.from_rest;
@@ -166,6 +167,8 @@ Body add_motion(CLI::App& program, std::string& json_path) {
   sub->add_option("--rig", call->rig, "rig.toml; a dataset folder's own is found by itself");
   sub->add_option("--hold", call->holds,
                   "hold a parameter, e.g. inertia=0.0085 (default: the rig's inertia)");
+  sub->add_option("--start", call->starts,
+                  "where the search begins, e.g. A=-20000 (default: found from the data)");
   sub->add_option("--gravity", call->gravity, "known gravity torque m g l, e.g. \"1.5 N m\"");
   sub->add_option("--friction-speed", call->friction_speed, "v_s of the Coulomb friction's tanh, rad/s")
       ->check(CLI::PositiveNumber)

@@ -61,26 +61,18 @@ class RunCost final : public ceres::CostFunction {
       state.angle = blocks[1][0];
       state.speed = blocks[1][1];
     }
-    ++passes_;
+    if (!sums_at(state)) return false;
     if (jacobians == nullptr) {
-      std::vector<double> predicted(run_.time.size());
-      if (!motion::predict(run_, state, options_, predicted.data())) return false;
-      double square = 0;
-      for (std::size_t i = 0; i < predicted.size(); ++i) {
-        square += (run_.angle[i] - predicted[i]) * (run_.angle[i] - predicted[i]);
-      }
       std::fill_n(residuals, kResidualSize, 0.0);
-      residuals[kResidualSize - 1] = std::sqrt(square);
+      residuals[kResidualSize - 1] = std::sqrt(sums_.square);
       return true;
     }
-    std::vector<Sums> sums;
-    if (!motion::accumulate(run_, state, options_, 0, sums)) return false;
     constexpr int n = motion::kUsedLanes;
     Eigen::Matrix<double, n, n> gram;
     Eigen::Matrix<double, n, 1> moment;
     for (int i = 0; i < n; ++i) {
-      moment[i] = sums[0].moment[i] * lane_scale(i);
-      for (int j = 0; j < n; ++j) gram(i, j) = sums[0].gram[i][j] * lane_scale(i) * lane_scale(j);
+      moment[i] = sums_.moment[i] * lane_scale(i);
+      for (int j = 0; j < n; ++j) gram(i, j) = sums_.gram[i][j] * lane_scale(i) * lane_scale(j);
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>> eigen(gram);
     if (eigen.info() != Eigen::Success) return false;
@@ -89,7 +81,7 @@ class RunCost final : public ceres::CostFunction {
     const double smallest = 1e-14 * root.maxCoeff();
     for (int i = 0; i < n; ++i) r[i] = root[i] > smallest ? r[i] / root[i] : 0.0;
     Eigen::Map<Eigen::Matrix<double, n, 1>>(residuals, n) = r;
-    residuals[n] = std::sqrt(std::max(0.0, sums[0].square - r.squaredNorm()));
+    residuals[n] = std::sqrt(std::max(0.0, sums_.square - r.squaredNorm()));
     const Eigen::Matrix<double, n, n> slope = -(root.asDiagonal() * eigen.eigenvectors().transpose());
     if (jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, kResidualSize, kMotionParameters, Eigen::RowMajor>> out(jacobians[0]);
@@ -105,6 +97,19 @@ class RunCost final : public ceres::CostFunction {
   }
 
  private:
+  /// Ceres asks for the cost of a step first and for its Jacobian when the step is taken: one pass serves both.
+  bool sums_at(const motion::State& state) const {
+    if (known_ && state.parameters == at_.parameters && state.angle == at_.angle && state.speed == at_.speed)
+      return valid_;
+    std::vector<Sums> sums;
+    ++passes_;
+    known_ = true;
+    at_ = state;
+    valid_ = motion::accumulate(run_, state, options_, 0, sums);
+    if (valid_) sums_ = sums.front();
+    return valid_;
+  }
+
   [[nodiscard]] double lane_scale(int lane) const {
     return lane < kMotionParameters ? scale_[static_cast<std::size_t>(lane)] : 1.0;
   }
@@ -113,6 +118,9 @@ class RunCost final : public ceres::CostFunction {
   const MotionOptions& options_;
   MotionVector scale_;
   int& passes_;
+  mutable bool known_ = false, valid_ = false;
+  mutable motion::State at_;
+  mutable Sums sums_;
 };
 
 struct Solution {

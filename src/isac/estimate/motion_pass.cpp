@@ -52,33 +52,37 @@ ISAC_INLINE Rates rates(const Constants& k, const Point& x, double command) {
   return d;
 }
 
+/// Sensitivities of `L` unknowns: eight are enough where the initial state is known, twelve where it is fitted.
+template <int L>
 struct Lanes {
-  alignas(64) double phi[kLanes], omega[kLanes], q[kLanes];
+  alignas(64) double phi[L], omega[L], q[L];
 };
 
 /// Rates of the sensitivities at a stage: F_x s + F_θ.
-ISAC_INLINE void lane_rates(const Constants& k, const Point& x, const Rates& d, const Lanes& s, Lanes& ds,
-                            double tanh_known) {
+template <int L>
+ISAC_INLINE void lane_rates(const Constants& k, const Point& x, const Rates& d, const Lanes<L>& s,
+                            Lanes<L>& ds, double tanh_known) {
   const double cos_value = k.gravity != 0 ? std::cos(x.phi) : 0.0;
   const double a = (k.stiffness - k.gravity * cos_value) * k.inverse_inertia;
   const double b = -(3 * k.cubic * x.omega * x.omega + k.viscous +
                      k.friction * k.inverse_friction_speed * (1 - tanh_known * tanh_known)) *
                    k.inverse_inertia;
   const double c = k.gain * k.inverse_inertia;
-  alignas(64) double force[kLanes] = {
+  alignas(64) double force[L] = {
       -d.omega * k.inverse_inertia,      k.wheel2 * x.phi * k.inverse_inertia,
       k.wheel * x.q * k.inverse_inertia, -x.omega * x.omega * x.omega * k.inverse_inertia,
       -x.omega * k.inverse_inertia,      -tanh_known * k.inverse_inertia};
-  for (int j = 0; j < kLanes; ++j) ds.phi[j] = s.omega[j];
-  for (int j = 0; j < kLanes; ++j) ds.omega[j] = a * s.phi[j] + b * s.omega[j] + c * s.q[j] + force[j];
-  for (int j = 0; j < kLanes; ++j) ds.q[j] = -k.inverse_lag * s.q[j];
+  for (int j = 0; j < L; ++j) ds.phi[j] = s.omega[j];
+  for (int j = 0; j < L; ++j) ds.omega[j] = a * s.phi[j] + b * s.omega[j] + c * s.q[j] + force[j];
+  for (int j = 0; j < L; ++j) ds.q[j] = -k.inverse_lag * s.q[j];
   ds.q[kLag] -= d.q * k.inverse_lag;
 }
 
-ISAC_INLINE void shifted(const Lanes& s, const Lanes& ds, double h, Lanes& out) {
-  for (int j = 0; j < kLanes; ++j) out.phi[j] = s.phi[j] + h * ds.phi[j];
-  for (int j = 0; j < kLanes; ++j) out.omega[j] = s.omega[j] + h * ds.omega[j];
-  for (int j = 0; j < kLanes; ++j) out.q[j] = s.q[j] + h * ds.q[j];
+template <int L>
+ISAC_INLINE void shifted(const Lanes<L>& s, const Lanes<L>& ds, double h, Lanes<L>& out) {
+  for (int j = 0; j < L; ++j) out.phi[j] = s.phi[j] + h * ds.phi[j];
+  for (int j = 0; j < L; ++j) out.omega[j] = s.omega[j] + h * ds.omega[j];
+  for (int j = 0; j < L; ++j) out.q[j] = s.q[j] + h * ds.q[j];
 }
 
 ISAC_INLINE Point moved(const Point& x, const Rates& d, double h) {
@@ -102,14 +106,15 @@ ISAC_INLINE Point step(const Constants& k, const Point& x, double h, double u0, 
 }
 
 /// State and sensitivities one step on.
-ISAC_INLINE Point step_with_lanes(const Constants& k, const Point& x, Lanes& s, double h, double u0,
+template <int L>
+ISAC_INLINE Point step_with_lanes(const Constants& k, const Point& x, Lanes<L>& s, double h, double u0,
                                   double u1) {
   const double middle = 0.5 * (u0 + u1);
   // tanh is needed even where T_c is zero now: its column −tanh/I is what could lift it from zero.
   const auto tanh_at = [&k](const Point& y, const Rates& d) {
     return k.friction != 0 ? d.tanh_value : std::tanh(y.omega * k.inverse_friction_speed);
   };
-  Lanes da, db, dc, dd, t;
+  Lanes<L> da, db, dc, dd, t;
   const Rates a = rates(k, x, u0);
   lane_rates(k, x, a, s, da, tanh_at(x, a));
   const Point xb = moved(x, a, h / 2);
@@ -125,10 +130,9 @@ ISAC_INLINE Point step_with_lanes(const Constants& k, const Point& x, Lanes& s, 
   shifted(s, dc, h, t);
   lane_rates(k, xd, d, t, dd, tanh_at(xd, d));
   const double w = h / 6;
-  for (int j = 0; j < kLanes; ++j) s.phi[j] += w * (da.phi[j] + 2 * (db.phi[j] + dc.phi[j]) + dd.phi[j]);
-  for (int j = 0; j < kLanes; ++j)
-    s.omega[j] += w * (da.omega[j] + 2 * (db.omega[j] + dc.omega[j]) + dd.omega[j]);
-  for (int j = 0; j < kLanes; ++j) s.q[j] += w * (da.q[j] + 2 * (db.q[j] + dc.q[j]) + dd.q[j]);
+  for (int j = 0; j < L; ++j) s.phi[j] += w * (da.phi[j] + 2 * (db.phi[j] + dc.phi[j]) + dd.phi[j]);
+  for (int j = 0; j < L; ++j) s.omega[j] += w * (da.omega[j] + 2 * (db.omega[j] + dc.omega[j]) + dd.omega[j]);
+  for (int j = 0; j < L; ++j) s.q[j] += w * (da.q[j] + 2 * (db.q[j] + dc.q[j]) + dd.q[j]);
   return combined(x, a, b, c, d, h);
 }
 
@@ -152,11 +156,14 @@ ISAC_SIMD bool predict_rows(const Prepared& run, const Constants& k, Point x, do
   return true;
 }
 
-ISAC_SIMD bool accumulate_rows(const Prepared& run, const Constants& k, Point x, std::size_t block_rows,
-                               std::vector<Sums>& blocks) {
-  Lanes s = {};
-  s.phi[kInitialAngle] = 1;
-  s.omega[kInitialSpeed] = 1;
+template <int L>
+ISAC_INLINE bool accumulate_lanes(const Prepared& run, const Constants& k, Point x, std::size_t block_rows,
+                                  std::vector<Sums>& blocks) {
+  Lanes<L> s = {};
+  if constexpr (L > kInitialSpeed) {
+    s.phi[kInitialAngle] = 1;
+    s.omega[kInitialSpeed] = 1;
+  }
   const std::size_t n = run.time.size();
   Sums* sums = nullptr;
   for (std::size_t i = 0; i < n; ++i) {
@@ -164,11 +171,11 @@ ISAC_SIMD bool accumulate_rows(const Prepared& run, const Constants& k, Point x,
     const double e = run.angle[i] - x.phi;
     sums->square += e * e;
     ++sums->rows;
-    for (int row = 0; row < kLanes; ++row) {
+    for (int row = 0; row < L; ++row) {
       const double weight = s.phi[row];
-      for (int j = 0; j < kLanes; ++j) sums->gram[row][j] += weight * s.phi[j];
+      for (int j = 0; j < L; ++j) sums->gram[row][j] += weight * s.phi[j];
     }
-    for (int j = 0; j < kLanes; ++j) sums->moment[j] += e * s.phi[j];
+    for (int j = 0; j < L; ++j) sums->moment[j] += e * s.phi[j];
     if (i + 1 == n) break;
     const int pieces = run.substeps[i];
     const double h = (run.time[i + 1] - run.time[i]) / pieces;
@@ -179,6 +186,16 @@ ISAC_SIMD bool accumulate_rows(const Prepared& run, const Constants& k, Point x,
     if (!sane(x)) return false;
   }
   return true;
+}
+
+ISAC_SIMD bool accumulate_parameters(const Prepared& run, const Constants& k, Point x, std::size_t block_rows,
+                                     std::vector<Sums>& blocks) {
+  return accumulate_lanes<8>(run, k, x, block_rows, blocks);
+}
+
+ISAC_SIMD bool accumulate_all(const Prepared& run, const Constants& k, Point x, std::size_t block_rows,
+                              std::vector<Sums>& blocks) {
+  return accumulate_lanes<kLanes>(run, k, x, block_rows, blocks);
 }
 
 }  // namespace
@@ -269,8 +286,11 @@ bool predict(const Prepared& run, const State& state, const MotionOptions& optio
 bool accumulate(const Prepared& run, const State& state, const MotionOptions& options, std::size_t block_rows,
                 std::vector<Sums>& blocks) {
   const double q = options.initial_rest ? 0.0 : run.command_from.front();
-  return accumulate_rows(run, constants_of(state.parameters, options), {state.angle, state.speed, q},
-                         block_rows == 0 ? run.time.size() + 1 : block_rows, blocks);
+  const Constants constants = constants_of(state.parameters, options);
+  const Point start{state.angle, state.speed, q};
+  const std::size_t rows = block_rows == 0 ? run.time.size() + 1 : block_rows;
+  return options.initial_rest ? accumulate_parameters(run, constants, start, rows, blocks)
+                              : accumulate_all(run, constants, start, rows, blocks);
 }
 
 }  // namespace isac::estimate::motion
