@@ -23,7 +23,8 @@ constexpr double kBias = 3 * kPascalPerKgfCm2, kTwo = 2 * kPascalPerKgfCm2;
 TEST(Gate, holds_delta_pressure_within_two_kilograms) {
   Conditioned<double> out;
   for (const double sign : {1.0, -1.0}) {
-    ASSERT_EQ(condition(JointLimits<double>{}, kBias, 0.0, sign * 5 * kPascalPerKgfCm2, 5e-4, out), Status::kOk);
+    ASSERT_EQ(condition(JointLimits<double>{}, kBias, 0.0, sign * 5 * kPascalPerKgfCm2, 5e-4, out),
+              Status::kOk);
     EXPECT_EQ(out.delta_pressure, sign * kTwo);
     EXPECT_EQ(out.pressure.muscle_1, kBias - sign * kTwo);
     EXPECT_EQ(out.pressure.muscle_2, kBias + sign * kTwo);

@@ -19,8 +19,8 @@ constexpr double kExact = 1e-12;  // rounding of a few operations on numbers of 
 
 TEST(Pid, follows_its_equation_on_a_ramp_at_changing_intervals) {
   // e = 1 + 2 t at t_k: u = K_P e_k + K_I Σ e_k h_k + K_D de/dt, with T_f = 0 the exact slope.
-  Pid<double> pid({.gains = {.proportional = 3, .integral = 5, .derivative = 0.7},
-                   .derivative_on_measurement = false});
+  Pid<double> pid(
+      {.gains = {.proportional = 3, .integral = 5, .derivative = 0.7}, .derivative_on_measurement = false});
   double t = 0, sum = 0, u = 0;
   for (int k = 0; k < 50; ++k) {
     const double h = k % 3 == 0 ? 0.001 : 0.0025;
@@ -71,7 +71,8 @@ TEST(Pid, integral_stops_at_the_limit_exactly_as_the_seed_does_it) {
 TEST(Pid, integral_does_not_wind_up_while_the_output_is_limited) {
   for (const AntiWindup kind :
        {AntiWindup::kTakeBack, AntiWindup::kConditional, AntiWindup::kBackCalculation}) {
-    Pid<double> pid({.gains = {.proportional = 1, .integral = 10}, .low = -1, .high = 1, .anti_windup = kind});
+    Pid<double> pid(
+        {.gains = {.proportional = 1, .integral = 10}, .low = -1, .high = 1, .anti_windup = kind});
     double u = 0;
     for (int k = 0; k < 5000; ++k) ASSERT_EQ(pid.step(5.0, 0.0, 0.001, u), Status::kOk);
     EXPECT_EQ(u, 1.0);
@@ -91,7 +92,8 @@ TEST(Pid, the_seeds_rule_can_stay_at_the_limit_and_the_conditional_one_comes_bac
   // An integral above the limit (here by a transfer) with a small error of the other sign: u stays ≥ high, so the increment
   // that would lead out is taken back too.
   const auto after_ten_seconds = [](AntiWindup kind) {
-    Pid<double> pid({.gains = {.proportional = 0.1, .integral = 1}, .low = -1, .high = 1, .anti_windup = kind});
+    Pid<double> pid(
+        {.gains = {.proportional = 0.1, .integral = 1}, .low = -1, .high = 1, .anti_windup = kind});
     pid.transfer(1.5, 0.0, 0.0);
     double u = 0;
     for (int k = 0; k < 10000; ++k) EXPECT_EQ(pid.step(-0.2, 0.0, 0.001, u), Status::kOk);
@@ -112,7 +114,8 @@ TEST(Pid, back_calculation_comes_to_rest_where_increment_and_tracking_balance) {
                    .tracking_time = tt});
   double u = 0;
   for (int k = 0; k < 5000; ++k) ASSERT_EQ(pid.step(e, 0.0, h, u), Status::kOk);
-  EXPECT_NEAR(pid.integral_term(), 1 - kp * e + ki * e * (tt - h), 1e-9);  // 100 time constants of a geometric series
+  EXPECT_NEAR(pid.integral_term(), 1 - kp * e + ki * e * (tt - h),
+              1e-9);  // 100 time constants of a geometric series
 }
 
 TEST(Pid, transfer_makes_the_next_output_the_one_asked_for) {

@@ -39,7 +39,7 @@ TEST(DelayLine, gives_back_the_value_of_then_at_changing_intervals) {
 JointSettings<double> fast_pid() {
   JointSettings<double> s = testbed_settings<double>();
   s.structure = Structure::kPid;
-  s.position = {.proportional = 3e5, .integral = 1e6, .derivative = 8e3};
+  s.position = {.proportional = 8e5, .integral = 2e6, .derivative = 2e4};
   s.limits.speed = std::numeric_limits<double>::infinity();
   s.derivative_filter = 0.002;
   return s;
@@ -81,8 +81,8 @@ TEST(Predictor, makes_the_loop_act_as_if_the_dead_time_were_behind_it) {
     worst = std::max(worst, std::abs(with[k + kDead] - free[k]));
     worst_without = std::max(worst_without, std::abs(without[k + kDead] - free[k]));
   }
-  EXPECT_LT(worst, 0.004);          // 2 % of the step: the model's Euler steps, h/T_J = 1.6 %
-  EXPECT_GT(worst_without, 0.04);   // without it the same gains ring
+  EXPECT_LT(worst, 0.004);         // 2 % of the step: the model's Euler steps, h/T_J = 1.6 %
+  EXPECT_GT(worst_without, 0.04);  // without it the same gains ring
   RecordProperty("worst_with", std::to_string(worst));
   RecordProperty("worst_without", std::to_string(worst_without));
 }

@@ -14,10 +14,10 @@ namespace isac::test {
 struct Rk4Joint {
   double A = -23450, B = 174.2 / 98066.5, C = 0.0026, D = 0.14, r = 0.019, J = 0.0085;
   double valve_gain = 1, lag = 0.17;
-  int dead_steps = 0;        ///< of the control period
-  double coulomb = 0;        ///< N m, tanh-smoothed over 1 mrad/s
-  bool clamped = false;      ///< φ held
-  double external = 0;       ///< N m
+  int dead_steps = 0;                           ///< of the control period
+  double coulomb = 0;                           ///< N m, tanh-smoothed over 1 mrad/s
+  bool clamped = false;                         ///< φ held
+  double external = 0;                          ///< N m
   std::function<double(double)> load_of_angle;  ///< N m over φ, e.g. gravity
 
   double p1 = 0, p2 = 0, angle = 0, velocity = 0;  ///< Pa, rad, rad/s

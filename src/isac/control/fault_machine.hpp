@@ -41,7 +41,7 @@ struct TickInputs {
   bool arm = false;          ///< level; an edge arms
   bool disarm = false;       ///< level; wins over arm
   bool acknowledge = false;  ///< level; an edge lets a latched fault go
-  Finding finding;           ///< the first thing the watches found in this sample
+  Finding finding{};         ///< the first thing the watches found in this sample
 };
 
 class FaultMachine {

@@ -102,7 +102,7 @@ class JointController {
     const S feedback = settings_.structure == Structure::kCascade ? now.torque : model_torque(now, delta_);
     const S angle = now.angle + correction_;
     const S reference = next_reference(wanted.angle, dt, limited);
-    if (fresh_) transfer(feedback, angle, reference, wanted.load);
+    if (fresh_) transfer(angle, reference, wanted.load);
 
     S delta{};
     if (settings_.structure == Structure::kPid) {
@@ -161,9 +161,9 @@ class JointController {
     outer_time_ = S(0.0);
   }
 
-  void transfer(const S& feedback, const S& angle, const S& reference, const S& load) noexcept {
-    if (from_rest_)
-      total_ = feedback;  // what the pair gives by itself: the torque loop starts without an error
+  void transfer(const S& angle, const S& reference, const S& load) noexcept {
+    // From rest the position loop starts with nothing of its own, so that the load is carried from the first tick on.
+    if (from_rest_) total_ = load;
     from_rest_ = false;
     if (settings_.structure == Structure::kPid) {
       position_.transfer(delta_, reference, angle);

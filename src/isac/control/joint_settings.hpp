@@ -32,18 +32,18 @@ enum class ModelPressure : std::uint8_t {
 template <class S>
 struct JointSettings {
   Structure structure = Structure::kModelBased;
-  models::JointCoefficients<S> muscle;
+  models::JointCoefficients<S> muscle{};
   S wheel_radius{};                                ///< m
   S mean_pressure = S(3.0 * kPascalPerKgfCm2);     ///< Pa, p0
   S inertia{};                                     ///< kg m²; only the dead-time predictor needs it
-  models::ValveUnit<S> valve;                      ///< for kPredicted and the predictor
-  PidGains<S> position, torque;                    ///< outer (or only) loop, inner loop
+  models::ValveUnit<S> valve{};                    ///< for kPredicted and the predictor
+  PidGains<S> position{}, torque{};                ///< outer (or only) loop, inner loop
   S derivative_filter = S(0.005);                  ///< s, of K_D of the position loop
   AntiWindup anti_windup = AntiWindup::kTakeBack;  ///< of both loops
   int outer_every = 10;  ///< inner ticks per step of the outer loop: 2 kHz and 0.2 kHz
   ModelPressure model_pressure = ModelPressure::kCommanded;
   bool predict_dead_time = false;
-  JointLimits<S> limits;
+  JointLimits<S> limits{};
 };
 
 /// kOutOfRange or kNotFinite for settings that cannot drive a joint.
@@ -91,11 +91,11 @@ struct JointReference {
 
 template <class S>
 struct JointCommand {
-  models::PressurePair<S> pressure;  ///< Pa; both 0: vented
-  S delta_pressure{};                ///< Pa
-  S wanted_torque{};                 ///< N m, what the inner loop was asked for, load included
-  S torque{};                        ///< N m, fed back: measured or from the model
-  std::uint8_t limited = 0;          ///< LimitFlag
+  models::PressurePair<S> pressure{};  ///< Pa; both 0: vented
+  S delta_pressure{};                  ///< Pa
+  S wanted_torque{};                   ///< N m, what the inner loop was asked for, load included
+  S torque{};                          ///< N m, fed back: measured or from the model
+  std::uint8_t limited = 0;            ///< LimitFlag
   bool vented = true;
 };
 

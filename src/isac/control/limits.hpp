@@ -59,9 +59,9 @@ template <class S>
 
 template <class S>
 struct Conditioned {
-  models::PressurePair<S> pressure;  ///< Pa
-  S delta_pressure{};                ///< Pa, of that pair: what the valves are really asked for
-  std::uint8_t limited = 0;          ///< LimitFlag
+  models::PressurePair<S> pressure{};  ///< Pa
+  S delta_pressure{};                  ///< Pa, of that pair: what the valves are really asked for
+  std::uint8_t limited = 0;            ///< LimitFlag
 };
 
 /// `out` is untouched unless the status is ok.

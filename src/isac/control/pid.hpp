@@ -40,7 +40,7 @@ enum class AntiWindup : std::uint8_t { kTakeBack, kConditional, kBackCalculation
 
 template <class S>
 struct PidSettings {
-  PidGains<S> gains;
+  PidGains<S> gains{};
   S low = -std::numeric_limits<S>::infinity();
   S high = std::numeric_limits<S>::infinity();
   AntiWindup anti_windup = AntiWindup::kTakeBack;

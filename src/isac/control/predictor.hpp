@@ -70,10 +70,10 @@ inline constexpr std::size_t kMaxDelaySteps = 128;  ///< 64 ms at 2 kHz
 
 template <class S>
 struct PredictedJoint {
-  models::JointCoefficients<S> muscle;
-  S wheel_radius{};            ///< m
-  S inertia{};                 ///< kg m²
-  models::ValveUnit<S> valve;  ///< with the dead time that is predicted away
+  models::JointCoefficients<S> muscle{};
+  S wheel_radius{};              ///< m
+  S inertia{};                   ///< kg m²
+  models::ValveUnit<S> valve{};  ///< with the dead time that is predicted away
 };
 
 template <class S>

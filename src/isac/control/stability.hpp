@@ -63,10 +63,10 @@ template <class S>
 
 template <class S>
 struct CascadeLoop {
-  models::JointCoefficients<S> muscle;  ///< C does not enter a linear loop
+  models::JointCoefficients<S> muscle{};  ///< C does not enter a linear loop
   S wheel_radius{}, inertia{};
-  models::ValveUnit<S> valve;
-  PidGains<S> position, torque;  ///< K_D is not used
+  models::ValveUnit<S> valve{};
+  PidGains<S> position{}, torque{};  ///< K_D is not used
 };
 
 namespace detail {

@@ -43,7 +43,7 @@ struct Bound {
 
 template <class S>
 struct JointWatchSettings {
-  Bound<S> pressure, delta_pressure, angle, speed, force, torque;
+  Bound<S> pressure{}, delta_pressure{}, angle{}, speed{}, force{}, torque{};
   S persistence = S(0.010);  ///< s
   S following = std::numeric_limits<S>::infinity();
   S following_time = S(0.1);  ///< s
