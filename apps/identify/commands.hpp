@@ -20,6 +20,7 @@ Body add_joint(CLI::App& program, std::string& json_path);
 Body add_motion(CLI::App& program, std::string& json_path);
 Body add_pcu(CLI::App& program, std::string& json_path);
 Body add_muscle(CLI::App& program, std::string& json_path);
+Body add_masses(CLI::App& program, std::string& json_path);
 Body add_calibrate(CLI::App& program, std::string& json_path);
 Body add_check(CLI::App& program, std::string& json_path);
 Body add_export(CLI::App& program, std::string& json_path);

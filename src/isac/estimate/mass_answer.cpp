@@ -8,6 +8,7 @@
 namespace isac::estimate {
 
 using Kind = MassUnknown::Kind;
+
 void add_warnings(const MassProblem& problem, const Eigen::VectorXd& values, const MassState& state,
                   MassFit& fit) {
   auto& warnings = fit.warnings;

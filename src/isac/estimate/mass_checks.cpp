@@ -63,19 +63,16 @@ struct Score {
 
 }  // namespace
 
-void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values, double degrees_of_freedom,
+void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values, const MassState& state,
                       MassFit& fit) {
-  Eigen::MatrixXd jacobian;
-  Eigen::VectorXd residual;
-  problem.linearise(values, jacobian, residual);
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(jacobian);
-  const double squares = residual.squaredNorm();
+  const auto own = static_cast<double>(static_cast<Eigen::Index>(problem.unknowns.size()) - problem.priors());
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(state.jacobian);
   const std::vector<Candidate> all = candidates(problem, values);
   std::vector<Score> scores;
   fit.sensitivities.clear();
   for (const Candidate& candidate : all) {
     const Eigen::VectorXd moved = qr.solve(candidate.column);  // what the fit makes of one unit of the error
-    const Eigen::VectorXd rest = candidate.column - jacobian * moved;
+    const Eigen::VectorXd rest = candidate.column - state.jacobian * moved;
     MassSensitivity sensitivity{candidate.cause, candidate.unit, std::vector<double>(fit.masses.size(), 0)};
     for (std::size_t k = 0; k < problem.unknowns.size(); ++k) {
       if (problem.unknowns[k].kind == Kind::kMass)
@@ -85,11 +82,18 @@ void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values,
     Score score;
     const double length = rest.norm();
     score.seen_per_unit = length;
-    if (length > 1e-6 * candidate.column.norm() && length > 0 && degrees_of_freedom > 1) {
-      score.amount = rest.dot(residual) / (length * length);
-      const double left = std::max(squares - std::pow(rest.dot(residual) / length, 2), 0.0);
-      const double spread = std::sqrt(std::max(left / (degrees_of_freedom - 1), 1e-24));
-      score.p_value = series::student_t_two_sided(score.amount * length / spread, degrees_of_freedom - 1);
+    // Rows that neither the unknowns nor this error move are no evidence: their torque may never have been measured.
+    double squares = 0, freedom = -own;
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(problem.data.size()); ++i) {
+      if (!state.informative[static_cast<std::size_t>(i)] && candidate.column[i] == 0) continue;
+      squares += state.residual[i] * state.residual[i];
+      freedom += 1;
+    }
+    if (length > 1e-6 * candidate.column.norm() && length > 0 && state.freedom > 0 && freedom > 1) {
+      score.amount = rest.dot(state.residual) / (length * length);
+      const double left = std::max(squares - std::pow(rest.dot(state.residual) / length, 2), 0.0);
+      const double spread = std::sqrt(std::max(left / (freedom - 1), 1e-24));
+      score.p_value = series::student_t_two_sided(score.amount * length / spread, freedom - 1);
     }
     scores.push_back(score);
   }

@@ -378,7 +378,7 @@ void Fitter::conclude() {
   }
   fill_rows(problem_, shown, solution_.values, fit_);
   add_warnings(problem_, solution_.values, state_, fit_);
-  if (n > 0) check_unmodelled(problem_, solution_.values, static_cast<double>(state_.freedom), fit_);
+  if (n > 0) check_unmodelled(problem_, solution_.values, state_, fit_);
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ struct MassChoice {
 [[nodiscard]] MassChoice choose_unknowns(MassProblem& problem, const MassFitOptions& options);
 
 /// Errors that the fit does not have: what each would do to the masses, and whether the residuals follow one of them.
-void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values, double degrees_of_freedom,
+void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values, const MassState& state,
                       MassFit& fit);
 
 }  // namespace isac::estimate

@@ -22,7 +22,7 @@ enum class DesignCriterion { kD, kA };
 
 struct PoseDesignOptions {
   int poses = 8;
-  DesignCriterion criterion = DesignCriterion::kD;
+  DesignCriterion criterion = DesignCriterion::kA;
   ArmVector torque_noise{0.1, 0.1, 0.1, 0.1, 0.1, 0.1};  ///< N m, on the arm's joints
   std::array<bool, kArmJoints> measured{true, true, true, true, true, true};
   std::vector<double> recorded;  ///< information of poses already held (MassFit::information), or empty
