@@ -47,10 +47,12 @@ std::vector<Candidate> candidates(const MassProblem& problem, const Eigen::Vecto
       out.push_back({"torque offset of joint " + number, "N m",
                      extend(problem.column({Kind::kOffset, j, {}, {}}, values)), false});
     }
+    // The predicted torque, not the measured one, whose noise is in the residual too.
     Eigen::VectorXd gain = Eigen::VectorXd::Zero(rows);
     for (std::size_t i = 0; i < problem.data.size(); ++i) {
       const MassDatum& row = problem.data[i];
-      if (row.joint == j) gain[static_cast<Eigen::Index>(i)] = row.gravity / row.noise;
+      if (row.joint == j)
+        gain[static_cast<Eigen::Index>(i)] = problem.predict(row, values, nullptr) / row.noise;
     }
     out.push_back({"torque gain of joint " + number, "-", std::move(gain), false});
   }

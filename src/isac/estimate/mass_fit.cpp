@@ -343,6 +343,9 @@ void Fitter::conclude() {
       answer.std_error = std::sqrt(total(k, k));
       answer.ci_low = answer.value - reach * answer.std_error;
       answer.ci_high = answer.value + reach * answer.std_error;
+      const bool part_of_sum = std::any_of(choice_.refused.begin(), choice_.refused.end(),
+                                           [&](const Estimated& r) { return r.name == answer.name; });
+      if (part_of_sum) continue;  // fitted in place of a sum that alone is known, and refused by name
       answers.push_back(answer);
       if (unknown.kind != Kind::kMass) continue;
       fit_.random_errors[unknown.index] = std::sqrt(random(k, k));
