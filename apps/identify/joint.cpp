@@ -136,6 +136,13 @@ nlohmann::ordered_json details_of(const estimate::JointFit& fit) {
                      {json_number(fit.box.delta_pressure_low), json_number(fit.box.delta_pressure_high)}},
                     {"angle_rad", {json_number(fit.box.angle_low), json_number(fit.box.angle_high)}},
                     {"speed_rad_s", {json_number(fit.box.speed_low), json_number(fit.box.speed_high)}}};
+  if (fit.angle_zero.used) {
+    extra["angle_zero"] = {{"value", json_number(fit.angle_zero.value)},
+                           {"std_error", json_number(fit.angle_zero.std_error)},
+                           {"half_step", json_number(fit.angle_zero.half_step)},
+                           {"resting_runs", fit.angle_zero.resting_runs},
+                           {"text", fit.angle_zero.sentence}};
+  }
   extra["tests"] = ordered_json::array();
   for (const estimate::ResidualTest& test : fit.tests) {
     extra["tests"].push_back({{"name", test.name},
@@ -162,6 +169,7 @@ void print_summary(const estimate::JointFit& fit, const std::string& unit) {
   fmt::print("rmse {:.4g} {} over {} rows", fit.rmse, unit, fit.samples);
   if (std::isfinite(fit.heldout_rmse)) fmt::print(", {:.4g} {} on held-out runs", fit.heldout_rmse, unit);
   fmt::print("; noise floor {:.4g} {}\n", fit.noise_floor, unit);
+  if (fit.angle_zero.used) fmt::print("· {}\n", fit.angle_zero.sentence);
   for (const estimate::ResidualTest& test : fit.tests)
     fmt::print("{} {}\n", test.passed ? "·" : "!", test.sentence);
   print_warnings(fit.warnings);
@@ -217,7 +225,11 @@ int run_joint(const Call& call, const std::string& json_path) {
     const double step = 2 * kPi / rig.encoder.steps_per_turn;
     const double extra = std::isfinite(rig.sensors.angle_noise) ? rig.sensors.angle_noise : 0.0;
     options.noise.angle = std::hypot(step / std::sqrt(12.0), extra);
+    options.noise.angle_step = step;
   }
+
+  if (signals.output == "torque" && std::isfinite(rig.sensors.force_lag))
+    options.output_lag = rig.sensors.force_lag;
 
   const record::ReadOptions reading{
       .map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};

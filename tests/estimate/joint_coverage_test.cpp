@@ -1,4 +1,5 @@
-// Two hundred short campaigns each under white and under coloured noise: are the intervals honest, and is there no bias?
+// Two hundred short campaigns each under white and under coloured noise, with an encoder that cuts off and a clamped run: are the
+// intervals honest, and is there no bias?
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -18,7 +19,7 @@ struct Score {
   double error_sum = 0, error_square = 0, deviation_sum = 0;
 };
 
-/// Three fast sweeps of 30 s at 150 Hz at three pressures. No clamped run: an encoder at rest has one error for the whole run.
+/// Three fast sweeps of 30 s at 150 Hz at three pressures, and a clamped run somewhere within an encoder step.
 std::vector<estimate::JointRun> campaign(const Sensors& sensors, unsigned seed) {
   std::vector<estimate::JointRun> runs;
   for (const double dp : {-1.0, 0.0, 1.0}) {
@@ -27,6 +28,10 @@ std::vector<estimate::JointRun> campaign(const Sensors& sensors, unsigned seed) 
     sweep.rate = 150;
     runs.push_back(record(sweep, Truth{}, sensors, seed * 10 + static_cast<unsigned>(2 + dp)));
   }
+  Sweep clamp = clamped(0.4 + 0.37e-3 * seed);
+  clamp.seconds = 20;
+  clamp.rate = 150;
+  runs.push_back(record(clamp, Truth{}, sensors, seed * 10 + 4));
   return runs;
 }
 
@@ -64,6 +69,21 @@ void expect_honest(const Sensors& sensors) {
 
 TEST(JointCoverage, intervals_hold_under_white_noise) {
   expect_honest(Sensors{});
+}
+
+TEST(JointCoverage, an_encoder_that_rounds_gives_what_one_that_cuts_off_gives) {
+  Sensors cuts, rounds;
+  rounds.in_step = 0.5;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const auto a = estimate::fit_joint(campaign(cuts, seed), {}, options_for(Truth{}));
+    const auto b = estimate::fit_joint(campaign(rounds, seed), {}, options_for(Truth{}));
+    ASSERT_TRUE(a.angle_zero.used && b.angle_zero.used);
+    EXPECT_EQ(a.angle_zero.resting_runs, 1u);
+    // Half a step of 2π/8000 apart, to within what the prior pulls back.
+    EXPECT_NEAR(a.angle_zero.value - b.angle_zero.value, 3.927e-4, 0.05 * 3.927e-4);
+    for (std::size_t k = 0; k < 4; ++k)
+      EXPECT_NEAR(a.parameters[k].value, b.parameters[k].value, 0.05 * a.parameters[k].std_error);
+  }
 }
 
 TEST(JointCoverage, intervals_hold_under_coloured_noise) {

@@ -27,10 +27,11 @@ struct Sensors {
   double force = 0.3;              // N, white, each force
   double pressure = 0.004 * kKgf;  // Pa, white, each pressure
   double encoder_steps = 8000;     // 0: exact
-  double coloured = 0;             // N m, standard deviation of a first-order process in the torque
-  double memory = 0.15;            // s, its time constant
-  double jitter = 0.02;            // of the interval
-  double spikes = 0;               // share of the rows with ±60 N in one force
+  double in_step = 0;    // where in a step the angle is read: 0 cuts off as a counter does, 0.5 rounds
+  double coloured = 0;   // N m, standard deviation of a first-order process in the torque
+  double memory = 0.15;  // s, its time constant
+  double jitter = 0.02;  // of the interval
+  double spikes = 0;     // share of the rows with ±60 N in one force
 };
 
 struct Sweep {
@@ -94,8 +95,7 @@ inline estimate::JointRun record(const Sweep& sweep, const Truth& truth, const S
     if (uniform(random) < sensors.spikes) difference += uniform(random) < 0.5 ? -60.0 : 60.0;
     const double step = sensors.encoder_steps > 0 ? kTwoPi / sensors.encoder_steps : 0.0;
     run.time.push_back(t);
-    // Counts change at the steps' edges; the middle position was calibrated to the middle of a step.
-    run.angle.push_back(step > 0 ? step * (std::floor(angle / step) + 0.5) : angle);
+    run.angle.push_back(step > 0 ? step * (std::floor(angle / step) + sensors.in_step) : angle);
     run.delta_pressure.push_back(dp + 0.5 * sensors.pressure * (normal(random) - normal(random)));
     run.mean_pressure.push_back(3.0 * kKgf + 0.5 * sensors.pressure * (normal(random) + normal(random)));
     run.output.push_back(truth.radius * difference + process);

@@ -37,8 +37,12 @@ TEST(JointSubsets, every_subset_of_the_experiments_recovers_or_rightly_refuses) 
         EXPECT_NEAR(e.value, values[k], std::max(5.0 * e.std_error, 1e-3 * std::abs(values[k])));
         EXPECT_NEAR(e.value, values[k], 0.25 * std::abs(values[k]));
       }
-      if (k >= 2) EXPECT_EQ(e.identifiable, expected[k]) << e.reason;
-      if (!expected[k]) EXPECT_FALSE(e.identifiable);
+      if (k >= 2) {
+        EXPECT_EQ(e.identifiable, expected[k]) << e.reason;
+      }
+      if (!expected[k]) {
+        EXPECT_FALSE(e.identifiable);
+      }
     }
   }
 }

@@ -59,6 +59,13 @@ TEST(Rig, needs_only_the_joint_and_knows_the_seeds_limits) {
   EXPECT_TRUE(rig.calibration.empty());
 }
 
+TEST(Rig, reads_the_lag_of_the_force_amplifiers_as_a_time) {
+  const std::string head = "format = \"isac.rig/1\"\n[joint]\n[sensors]\nforce_lag = ";
+  EXPECT_CLOSE(parse_rig(head + "\"0.16 ms\"\n", "x").sensors.force_lag, 0.16e-3);
+  EXPECT_THROW((void)parse_rig(head + "\"0.16 N\"\n", "x"), Error);
+  EXPECT_THROW((void)parse_rig(head + "\"-1 ms\"\n", "x"), Error);
+}
+
 TEST(Rig, the_same_length_in_any_unit_is_the_same_radius) {
   for (const char* diameter : {"38 mm", "3.8 cm", "0.038 m", " 38  mm ", "+38 mm", "3.8e-2 m", "38mm"}) {
     const Rig rig = parse_rig(
@@ -82,7 +89,7 @@ TEST(Rig, what_is_written_reads_back_to_the_same_bits) {
     rig.name = i % 3 == 0 ? "" : "rig \"" + std::to_string(i) + "\" \\ µ\n";
     if (i % 2 == 0) rig.joint = {positive(), positive(), positive()};
     rig.encoder = {positive(), static_cast<int>(random() % 100000) - 50000};
-    if (i % 5 != 0) rig.sensors = {positive(), positive(), positive(), positive()};
+    if (i % 5 != 0) rig.sensors = {positive(), positive(), positive(), positive(), positive()};
     rig.limits = {positive(), positive(), positive(), positive(), positive()};
     rig.card = {i % 4 == 0 ? "" : "sim:seed=3", i % 4 == 0 ? kNotGiven : positive()};
     if (i % 7 == 0) {
@@ -102,6 +109,7 @@ TEST(Rig, what_is_written_reads_back_to_the_same_bits) {
     ASSERT_TRUE(same(back.sensors.pressure_noise, rig.sensors.pressure_noise));
     ASSERT_TRUE(same(back.sensors.angle_noise, rig.sensors.angle_noise));
     ASSERT_TRUE(same(back.sensors.torque_noise, rig.sensors.torque_noise));
+    ASSERT_TRUE(same(back.sensors.force_lag, rig.sensors.force_lag));
     ASSERT_TRUE(same(back.limits.delta_pressure, rig.limits.delta_pressure));
     ASSERT_TRUE(same(back.limits.pressure, rig.limits.pressure));
     ASSERT_TRUE(same(back.limits.angle, rig.limits.angle));

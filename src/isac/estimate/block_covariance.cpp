@@ -7,7 +7,7 @@
 
 namespace isac::estimate {
 
-BlockCovariance block_covariance(const std::vector<BlockSums>& blocks) {
+BlockCovariance block_covariance(const std::vector<BlockSums>& blocks, const Prior& prior) {
   BlockCovariance out;
   if (blocks.empty()) return out;
   const Eigen::Index n = blocks.front().score.size();
@@ -16,6 +16,7 @@ BlockCovariance block_covariance(const std::vector<BlockSums>& blocks) {
   out.degrees_of_freedom = Eigen::VectorXd::Constant(n, kNan);
   Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n);
   for (const BlockSums& block : blocks) bread += block.curvature;
+  if (prior.curvature.size() == n) bread.diagonal() += prior.curvature;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(bread);
   if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > 0)) return out;
   const Eigen::MatrixXd root = eigen.operatorSqrt();
@@ -52,6 +53,14 @@ BlockCovariance block_covariance(const std::vector<BlockSums>& blocks) {
   for (Eigen::Index k = 0; k < n; ++k) {
     const double norm = square[k] + cross[static_cast<std::size_t>(k)].squaredNorm();
     out.degrees_of_freedom[k] = norm > 0 ? std::max(1.0, trace[k] * trace[k] / norm) : 1.0;
+  }
+  if (prior.score_variance.size() == n) {
+    const Eigen::MatrixXd known = inverse * prior.score_variance.asDiagonal() * inverse;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const double seen = out.covariance(k, k), ratio = seen > 0 ? 1.0 + known(k, k) / seen : 1e3;
+      out.degrees_of_freedom[k] *= std::min(ratio * ratio, 1e6);
+    }
+    out.covariance += known;
   }
   return out;
 }

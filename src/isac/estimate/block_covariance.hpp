@@ -26,6 +26,12 @@ struct BlockCovariance {
   Eigen::VectorXd degrees_of_freedom;
 };
 
-[[nodiscard]] BlockCovariance block_covariance(const std::vector<BlockSums>& blocks);
+/// What is known beforehand of parameters around zero: λ on the diagonal of H, and the variance λ² σ₀² of λ θ.
+struct Prior {
+  Eigen::VectorXd curvature, score_variance;
+};
+
+/// With a prior, V = H⁻¹ (Σ_b ũ_b ũ_bᵀ + Λ Σ₀ Λ) H⁻¹, and the share of V that the prior makes counts as known exactly.
+[[nodiscard]] BlockCovariance block_covariance(const std::vector<BlockSums>& blocks, const Prior& prior = {});
 
 }  // namespace isac::estimate

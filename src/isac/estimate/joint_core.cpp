@@ -67,7 +67,8 @@ Eigen::VectorXd linear_start(const RobustProblem& problem, const std::vector<dou
   squared.linearise(theta);
   const Pass pass = squared.pass(theta, 0, squared.rows, true, false);
   if (linear > 0) {
-    const Eigen::MatrixXd gram = pass.gram.topLeftCorner(linear, linear);
+    Eigen::MatrixXd gram = pass.gram.topLeftCorner(linear, linear);
+    if (problem.excess.size() > 0) gram -= problem.excess.topLeftCorner(linear, linear);
     const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     const Eigen::MatrixXd unit = scale.asDiagonal() * gram * scale.asDiagonal();
     theta.head(linear) = scale.cwiseProduct(unit.ldlt().solve(scale.cwiseProduct(pass.moment.head(linear))));
@@ -126,11 +127,11 @@ std::vector<double> omega_of(const RobustProblem& problem, const std::vector<dou
   return omega;
 }
 
-/// Full-size vector from the kept ones; the rest is `fill`.
+/// Full-size vector from kept linear and all nonlinear ones; the rest is zero, and the angle's zero is left out.
 Eigen::VectorXd spread_out(const Eigen::VectorXd& part, const std::vector<int>& kept, std::size_t linear,
-                           double fill) {
-  const Eigen::Index nonlinear = part.size() - static_cast<Eigen::Index>(kept.size());
-  Eigen::VectorXd out = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(linear) + nonlinear, fill);
+                           std::size_t nonlinear_size) {
+  const auto nonlinear = static_cast<Eigen::Index>(nonlinear_size);
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(linear) + nonlinear);
   for (std::size_t j = 0; j < kept.size(); ++j) out[kept[j]] = part[static_cast<Eigen::Index>(j)];
   out.tail(nonlinear) = part.tail(nonlinear);
   return out;
@@ -187,7 +188,7 @@ double residual_correlation_time(const JointRows& rows, std::span<const double> 
 }
 
 JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFitOptions& options,
-                         int window) {
+                         const RowRecipe& recipe) {
   JointCore out;
   const std::size_t linear = terms.linear().size(), nonlinear = terms.nonlinear().size();
   const bool correct = options.errors_in_variables;
@@ -211,7 +212,7 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
 
   RobustProblem problem = problem_of(rows, terms, kept);
   for (const int k : kept) out.used.push_back(rows.x(static_cast<std::size_t>(k)).data());
-  const int size = problem.size();
+  int size = problem.size();
   const auto total = static_cast<Eigen::Index>(linear + nonlinear);
   out.theta = Eigen::VectorXd::Zero(total);
   out.covariance = Eigen::MatrixXd::Constant(total, total, kNan);
@@ -258,24 +259,28 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
         problem.scale = spread * (options.loss.kind == Loss::Kind::kHuber ? kHuber : kCauchy);
       }
       if (correct && round > 0) {
-        const Eigen::VectorXd theta = spread_out(solution.theta, kept, linear, 0.0);
+        const Eigen::VectorXd theta = spread_out(solution.theta, kept, linear, nonlinear);
         if (options.effective_variance && out.spread > 0) {
           weights = effective_weights(rows, terms, theta, out.spread);
           problem.weight = weights.empty() ? nullptr : weights.data();
         }
         std::size_t ignored = 0;
         const std::vector<double> omega = omega_of(problem, out.residual, ignored);
+        if (set_zero(rows, terms, theta, recipe.angle_step, out.spread, problem, out.zero))
+          start = with_zero(solution.theta, kept.size(), nonlinear, problem);
+        size = problem.size();
         problem.excess = kept_excess(noise_gram(rows, terms, omega.data(), 0, rows.size()), kept, size);
+        problem.excess.diagonal() -= prior_of(out.zero, kept.size(), size).curvature;
       }
       solution = solve_now(start);
       start = solution.theta;
       problem.residuals(solution.theta, out.residual);
       out.spread = spread_of(out.residual);
-      if (nonlinear > 0) update_baseline(spread_out(solution.theta, kept, linear, 0.0));
+      if (nonlinear > 0) update_baseline(spread_out(solution.theta, kept, linear, nonlinear));
     }
     out.converged = solution.converged;
     out.report = solution.report;
-    out.theta = spread_out(solution.theta, kept, linear, 0.0);
+    out.theta = spread_out(solution.theta, kept, linear, nonlinear);
   }
   out.omega = omega_of(problem, out.residual, out.outliers);
   if (size == 0) return out;
@@ -287,10 +292,10 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
     interval = std::max(interval, run.interval);
   }
   out.correlation_seconds =
-      residual_correlation_time(rows, out.residual, 3.0 * out.spread, window * interval);
+      residual_correlation_time(rows, out.residual, 3.0 * out.spread, recipe.window * interval);
   double seconds = options.block_seconds;
   if (!std::isfinite(seconds)) {
-    const double wanted = std::max({20.0 * out.correlation_seconds, 4.0 * window * interval, 3.0});
+    const double wanted = std::max({20.0 * out.correlation_seconds, 4.0 * recipe.window * interval, 3.0});
     seconds = std::min(wanted, length / 12.0);
     out.blocks_cut_short = seconds < 0.5 * wanted;
   }
@@ -312,26 +317,44 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
   }
   // Scaled to a unit diagonal, so that roots and inverses lose nothing to units.
   const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  Prior prior = prior_of(out.zero, kept.size(), size, out.spread);
+  gram.diagonal() += prior.curvature;
+  prior.curvature = prior.curvature.cwiseProduct(scale).cwiseProduct(scale);
+  prior.score_variance = prior.score_variance.cwiseProduct(scale).cwiseProduct(scale);
   for (BlockSums& sum : sums) {
     sum.score = sum.score.cwiseProduct(scale);
     sum.curvature = scale.asDiagonal() * sum.curvature * scale.asDiagonal();
   }
-  BlockCovariance covariance = block_covariance(sums);
+  BlockCovariance covariance = block_covariance(sums, prior);
   const Eigen::MatrixXd cov = scale.asDiagonal() * covariance.covariance * scale.asDiagonal();
   const Eigen::VectorXd inflation = variance_inflation(gram);
   std::vector<int> place = kept;
   for (std::size_t q = 0; q < nonlinear; ++q) place.push_back(static_cast<int>(linear + q));
+  std::vector<Eigen::Index>
+      from;  // where the parameters stand among those fitted: the angle's zero is between them
+  for (std::size_t k = 0; k < place.size(); ++k)
+    from.push_back(static_cast<Eigen::Index>(k) +
+                   (k < kept.size() ? 0 : size - static_cast<Eigen::Index>(place.size())));
   for (std::size_t i = 0; i < place.size(); ++i) {
-    out.degrees_of_freedom[place[i]] = covariance.degrees_of_freedom[static_cast<Eigen::Index>(i)];
-    out.inflation[place[i]] = inflation[static_cast<Eigen::Index>(i)];
-    for (std::size_t j = 0; j < place.size(); ++j)
-      out.covariance(place[i], place[j]) = cov(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    out.degrees_of_freedom[place[i]] = covariance.degrees_of_freedom[from[i]];
+    out.inflation[place[i]] = inflation[from[i]];
+    for (std::size_t j = 0; j < place.size(); ++j) out.covariance(place[i], place[j]) = cov(from[i], from[j]);
+  }
+  if (!out.zero.column.empty()) {
+    const auto at = static_cast<Eigen::Index>(kept.size());
+    out.zero.value = solution.theta[at];
+    out.zero.std_error = std::sqrt(cov(at, at));
   }
   // Nonlinear parameters: a null direction at the answer is a combination that the data do not split.
   out.rank.fault.resize(linear + nonlinear, Rank::Fault::kNone);
   out.rank.partners.resize(linear + nonlinear);
   if (nonlinear > 0) {
-    const Rank local = find_rank(gram, Eigen::MatrixXd::Zero(size, size));
+    const auto count = static_cast<Eigen::Index>(place.size());
+    Eigen::MatrixXd own(count, count);
+    for (Eigen::Index i = 0; i < count; ++i)
+      for (Eigen::Index j = 0; j < count; ++j)
+        own(i, j) = gram(from[static_cast<std::size_t>(i)], from[static_cast<std::size_t>(j)]);
+    const Rank local = find_rank(own, Eigen::MatrixXd::Zero(count, count));
     for (std::size_t i = 0; i < place.size(); ++i) {
       const auto to = static_cast<std::size_t>(place[i]);
       if (local.fault[i] == Rank::Fault::kNone) continue;

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "isac/estimate/angle_zero.hpp"
 #include "isac/estimate/identifiability.hpp"
 #include "isac/estimate/joint_fit.hpp"
 #include "isac/estimate/joint_rows.hpp"
@@ -34,10 +35,11 @@ struct JointCore {
   double correlation_seconds = 0;
   bool blocks_cut_short = false;    ///< the record is too short for blocks as long as the noise remembers
   std::vector<const double*> used;  ///< columns that were fitted
+  ZeroFit zero;
 };
 
 [[nodiscard]] JointCore estimate_joint(const JointRows& rows, JointTerms& terms,
-                                       const JointFitOptions& options, int window);
+                                       const JointFitOptions& options, const RowRecipe& recipe);
 
 /// Blocks of equal time within each run, as near to `seconds` as goes; a run shorter than that is one block.
 [[nodiscard]] std::vector<BlockRange> time_blocks(const JointRows& rows, double seconds);

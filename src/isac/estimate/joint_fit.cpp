@@ -38,7 +38,8 @@ double root_mean_square(std::span<const double> a, std::span<const double> b) {
 }
 
 /// Measured and predicted of each run; returns the error over all of them.
-double add_runs(const JointRows& rows, const std::vector<double>& predicted, bool heldout, JointFit& fit) {
+double add_runs(const JointRows& rows, const std::vector<double>& predicted, bool heldout, bool keep_rows,
+                JointFit& fit) {
   for (const RunRows& run : rows.runs) {
     const auto cut = [&](const std::vector<double>& column) {
       return std::vector<double>(column.begin() + static_cast<std::ptrdiff_t>(run.begin),
@@ -47,13 +48,19 @@ double add_runs(const JointRows& rows, const std::vector<double>& predicted, boo
     RunResidual out;
     out.name = run.name;
     out.heldout = heldout;
+    out.rows = run.end - run.begin;
+    out.rmse = root_mean_square(std::span(rows.output).subspan(run.begin, out.rows),
+                                std::span(predicted).subspan(run.begin, out.rows));
+    if (!keep_rows) {
+      fit.runs.push_back(std::move(out));
+      continue;
+    }
     out.time = cut(rows.time);
     out.angle = cut(rows.input[static_cast<int>(Input::kAngle)]);
     out.velocity = cut(rows.input[static_cast<int>(Input::kVelocity)]);
     out.delta_pressure = cut(rows.input[static_cast<int>(Input::kDeltaPressure)]);
     out.measured = cut(rows.output);
     out.predicted = cut(predicted);
-    out.rmse = root_mean_square(out.measured, out.predicted);
     fit.runs.push_back(std::move(out));
   }
   return root_mean_square(rows.output, predicted);
@@ -92,7 +99,7 @@ JointFit fit_joint(std::span<const JointRun> runs, std::span<const JointRun> hel
                             "be there together over more than a window of {} samples; "
                             "record longer or mend the missing samples",
                             rows.seen, rows.size(), count, stated.recipe.window));
-  const JointCore core = estimate_joint(rows, terms, options, stated.recipe.window);
+  const JointCore core = estimate_joint(rows, terms, options, stated.recipe);
 
   JointFit fit;
   fit.converged = core.converged;
@@ -113,11 +120,14 @@ JointFit fit_joint(std::span<const JointRun> runs, std::span<const JointRun> hel
         fit.correlation[i * order.size() + j] =
             core.covariance(order[i], order[j]) /
             std::sqrt(core.covariance(order[i], order[i]) * core.covariance(order[j], order[j]));
+  fit.angle_zero = angle_zero(core.zero, options);
   fit.tests =
-      residual_tests(rows, core.used, core.residual, core.omega, core.blocks, stated.recipe.window, options);
+      residual_tests(rows, {core.used, core.zero.column, core.zero.resting, core.residual, core.omega},
+                     core.blocks, stated.recipe.window, options);
+  if (fit.angle_zero.used) fit.tests.push_back(zero_test(fit.angle_zero, core.zero, options));
 
   // The fitted runs are drawn with everything that was fitted; other runs are predicted from what is known only.
-  fit.rmse = add_runs(rows, predict(rows, terms, core.theta), false, fit);
+  fit.rmse = add_runs(rows, predict(rows, terms, core.theta), false, options.keep_rows, fit);
   const auto [low, high] = std::minmax_element(rows.output.begin(), rows.output.end());
   fit.nrmse = *high > *low ? fit.rmse / (*high - *low) : std::nan("");
   if (!heldout.empty()) {
@@ -131,7 +141,7 @@ JointFit fit_joint(std::span<const JointRun> runs, std::span<const JointRun> hel
     RowRecipe plain = stated.recipe;
     plain.parallel_filter = false;
     const JointRows others = make_rows(heldout, terms, plain);
-    fit.heldout_rmse = add_runs(others, predict(others, terms, known), true, fit);
+    fit.heldout_rmse = add_runs(others, predict(others, terms, known), true, options.keep_rows, fit);
     if (!unknown.empty())
       fit.warnings.push_back({"heldout_incomplete", "The held-out runs are predicted without " + unknown +
                                                         ", which these runs cannot tell."});
@@ -140,7 +150,8 @@ JointFit fit_joint(std::span<const JointRun> runs, std::span<const JointRun> hel
           {"heldout_worse",
            fmt::format("Held-out runs are predicted {:.1f} times worse than the fitted ones: they leave the "
                        "range of the fit or the model misses an effect; "
-                       "let isac-explain look at them.",
+                       "fit again with the effects that the residual tests name (isac-identify joint --terms "
+                       "A,B,C,D,…) and keep the term that makes this number smaller.",
                        fit.heldout_rmse / fit.rmse)});
   }
   bool damping = false;

@@ -41,8 +41,10 @@ struct Loss {
 
 /// Standard deviations of white measurement noise; NaN: estimated from the data.
 struct NoiseLevels {
-  double output = std::numeric_limits<double>::quiet_NaN();          ///< N m
-  double angle = std::numeric_limits<double>::quiet_NaN();           ///< rad, encoder step included
+  double output = std::numeric_limits<double>::quiet_NaN();  ///< N m
+  double angle = std::numeric_limits<double>::quiet_NaN();   ///< rad, encoder step included
+  double angle_step =
+      std::numeric_limits<double>::quiet_NaN();  ///< rad, of the encoder; NaN: from the data, 0: none
   double delta_pressure = std::numeric_limits<double>::quiet_NaN();  ///< Pa
 };
 
@@ -77,6 +79,9 @@ struct JointFitOptions {
   bool parallel_filter =
       true;  ///< output and all regressors pass the differentiator's low-pass (memoryless linear terms)
   OperatingRange operating;
+  double output_lag =
+      0;  ///< s, by which the output's sensor is late (a first-order amplifier: its time constant)
+  bool keep_rows = true;  ///< false: the columns of RunResidual stay empty, for callers that draw nothing
 };
 
 /// A check of the fitted model, with the sentence a lab engineer reads.
@@ -85,6 +90,17 @@ struct ResidualTest {
   double statistic = 0;
   double p_value = 1;
   bool passed = true;
+  std::string sentence;
+};
+
+/// A counter tells the angle to within a step, and nothing tells where in the step its zero is: the fit lets the zero move,
+/// with half a step as prior standard deviation. Not a parameter of the joint.
+struct AngleZero {
+  bool used = false;
+  double value = std::numeric_limits<double>::quiet_NaN();  ///< rad, added to the recorded angles
+  double std_error = std::numeric_limits<double>::quiet_NaN();
+  double half_step = 0;          ///< rad
+  std::size_t resting_runs = 0;  ///< runs within one step, each with an error of its own
   std::string sentence;
 };
 
@@ -100,6 +116,7 @@ struct RunResidual {
   std::string name;
   bool heldout = false;
   double rmse = std::numeric_limits<double>::quiet_NaN();
+  std::size_t rows = 0;  ///< usable
   std::vector<double> time, angle, velocity, delta_pressure, measured,
       predicted;  ///< usable rows only, for pictures
 };
@@ -122,6 +139,7 @@ struct JointFit {
   ValidityBox box;
   std::vector<ResidualTest> tests;
   VelocityCut cut;
+  AngleZero angle_zero;
   std::vector<RunResidual> runs;
   Warnings warnings;
 };

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "isac/series/differentiate.hpp"
 #include "isac/series/statistics.hpp"
@@ -53,12 +54,15 @@ RowNoise noise_of(const RowRecipe& recipe, double interval, bool velocity_measur
 
 /// Columns of one run over all its samples, NaN where not known.
 struct RunColumns {
-  std::vector<double> input[kInputs];
-  std::vector<std::vector<double>> x;
-  std::vector<double> y;
+  std::span<const double> input[kInputs];  ///< empty: zero throughout
+  std::span<const double> time, y;
+  std::vector<std::vector<double>> x;  ///< made only for the parallel filter, which needs whole columns
   std::vector<Segment> segments;
   double interval = 0;
   RowNoise noise;
+  bool resting = false;
+  std::vector<double> first, second, late;  ///< derivatives and shifted output that the spans look at
+  [[nodiscard]] double at(int z, std::size_t i) const { return input[z].empty() ? 0.0 : input[z][i]; }
 };
 
 /// A regressor that is a constant times one input; input −1: it is not.
@@ -86,55 +90,78 @@ Proportional proportional(const JointTerms& terms, std::size_t k) {
   return {read, factor};
 }
 
+/// x_k of rows [begin, end).
+void fill_regressor(const RunColumns& run, const JointTerms& terms, const RowRecipe& recipe, std::size_t k,
+                    std::size_t begin, std::size_t end, double* x) {
+  if (const Proportional p = proportional(terms, k);
+      p.input >= 0) {  // A, B, D, inertia: no need to ask row by row
+    const std::span<const double> z = run.input[p.input];
+    for (std::size_t i = begin; i < end; ++i) x[i - begin] = z.empty() ? 0.0 : p.factor * z[i];
+    return;
+  }
+  if (terms.is_cubic_damping(k)) {
+    // E[v̂³] = v³ + 3σ²v: the Hermite polynomial is unbiased.
+    const double sigma = recipe.unbiased_cube ? run.noise.raw[static_cast<int>(Input::kVelocity)] : 0.0;
+    const double factor = terms.regressor(k, {.velocity = 1.0});
+    const std::span<const double> v = run.input[static_cast<int>(Input::kVelocity)];
+    for (std::size_t i = begin; i < end; ++i)
+      x[i - begin] = factor * (v[i] * v[i] - 3.0 * sigma * sigma) * v[i];
+    return;
+  }
+  const double origin = run.time.empty() ? 0.0 : run.time.front();
+  for (std::size_t i = begin; i < end; ++i) {
+    const JointState state{run.at(0, i), run.at(1, i), run.at(2, i),
+                           run.at(3, i), run.at(4, i), run.time[i] - origin};
+    x[i - begin] = std::isfinite(state.velocity) ? terms.regressor(k, state) : std::nan("");
+  }
+}
+
+bool run_rests(std::span<const double> angle, double step) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double value : angle) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+    if (!rests(low, high, step)) return false;
+  }
+  return low <= high;
+}
+
 RunColumns columns_of(const JointRun& run, const JointTerms& terms, const RowRecipe& recipe) {
   RunColumns out;
-  const std::size_t rows = run.time.size();
   const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
   const bool measured = !run.velocity.empty();
   const bool acceleration = terms.reads(Input::kAcceleration);
   series::Derivatives d = series::differentiate(
       run.time, measured ? run.velocity : run.angle, polynomial,
       {.value = false, .first = !measured || acceleration, .second = !measured && acceleration});
-  out.segments = d.segments;
+  out.segments = std::move(d.segments);
   out.interval = d.interval;
+  out.first = std::move(d.first);
+  out.second = std::move(d.second);
   double velocity_noise = 0;
   if (measured && recipe.unbiased_cube)
     velocity_noise = series::sample_noise(run.time, run.velocity, recipe.order);
   out.noise = noise_of(recipe, d.interval, measured, std::isfinite(velocity_noise) ? velocity_noise : 0.0);
+  if (recipe.angle_step > 0 && run_rests(run.angle, recipe.angle_step)) {
+    out.resting = true;  // its error is a constant, which a parameter of its own takes up
+    out.noise.raw[static_cast<int>(Input::kAngle)] = out.noise.filtered[static_cast<int>(Input::kAngle)] = 0;
+  }
+  out.time = run.time;
   out.input[0] = run.angle;
-  out.input[1] = measured ? run.velocity : std::move(d.first);
-  out.input[2] = !acceleration ? std::vector<double>(rows, 0.0)
-                 : measured    ? std::move(d.first)
-                               : std::move(d.second);
-  out.input[3] = run.delta_pressure.empty() ? std::vector<double>(rows, 0.0) : run.delta_pressure;
-  out.input[4] = run.mean_pressure.empty() ? std::vector<double>(rows, 0.0) : run.mean_pressure;
+  out.input[1] = measured ? std::span<const double>(run.velocity) : out.first;
+  if (acceleration) out.input[2] = measured ? out.first : out.second;
+  out.input[3] = run.delta_pressure;
+  out.input[4] = run.mean_pressure;
   out.y = run.output;
-  const double sigma_v = recipe.unbiased_cube ? out.noise.raw[static_cast<int>(Input::kVelocity)] : 0.0;
-  out.x.assign(terms.linear().size(), {});
-  const double origin = rows > 0 ? run.time.front() : 0.0;
-  for (std::size_t k = 0; k < out.x.size(); ++k) {
-    auto& x = out.x[k];
-    x.resize(rows);
-    const bool cube = terms.is_cubic_damping(k);
-    if (const Proportional p = proportional(terms, k);
-        p.input >= 0) {  // A, B, D, inertia: no need to ask row by row
-      const std::vector<double>& z = out.input[p.input];
-      for (std::size_t i = 0; i < rows; ++i) x[i] = p.factor * z[i];
-      continue;
-    }
-    if (cube) {
-      // E[v̂³] = v³ + 3σ²v: the Hermite polynomial is unbiased.
-      const double factor = terms.regressor(k, {.velocity = 1.0});
-      const std::vector<double>& v = out.input[static_cast<int>(Input::kVelocity)];
-      for (std::size_t i = 0; i < rows; ++i) x[i] = factor * (v[i] * v[i] - 3.0 * sigma_v * sigma_v) * v[i];
-      continue;
-    }
-    for (std::size_t i = 0; i < rows; ++i) {
-      const JointState state{out.input[0][i], out.input[1][i], out.input[2][i],
-                             out.input[3][i], out.input[4][i], run.time[i] - origin};
-      x[i] = terms.regressor(k, state);
-      if (!std::isfinite(state.velocity)) x[i] = std::nan("");
-    }
+  if (recipe.output_lag > 0) {
+    out.late = advanced(run.time, run.output, recipe.output_lag, d.interval);
+    out.y = out.late;
+  }
+  if (recipe.parallel_filter) {
+    out.x.assign(terms.linear().size(), std::vector<double>(run.time.size()));
+    for (std::size_t k = 0; k < out.x.size(); ++k)
+      fill_regressor(out, terms, recipe, k, 0, run.time.size(), out.x[k].data());
   }
   return out;
 }
@@ -219,6 +246,59 @@ JointState JointRows::state(std::size_t i) const {
   return {input[0][i], input[1][i], input[2][i], input[3][i], input[4][i], time[i]};
 }
 
+bool rests(double lowest, double highest, double step) noexcept {
+  return highest - lowest <= 1.5 * step;
+}
+
+std::vector<double> advanced(std::span<const double> time, std::span<const double> signal, double lag,
+                             double interval) {
+  const std::size_t rows = std::min(time.size(), signal.size());
+  std::vector<double> out(rows, std::nan(""));
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const double wanted = time[i] + lag;
+    while (left + 1 < rows && time[left + 1] <= wanted) ++left;
+    if (left + 1 >= rows) break;
+    const double step = time[left + 1] - time[left];
+    if (step > 2.5 * interval) continue;
+    out[i] = signal[left] + (signal[left + 1] - signal[left]) * ((wanted - time[left]) / step);
+  }
+  return out;
+}
+
+namespace {
+
+/// Stretches of rows in which all columns are finite: 0 · x is 0 only there.
+std::vector<Segment> usable_rows(std::span<const std::span<const double>> columns, std::size_t rows) {
+  constexpr std::size_t kChunk = 512;
+  std::vector<Segment> out;
+  double probe[kChunk];
+  bool open = false;
+  for (std::size_t begin = 0; begin < rows; begin += kChunk) {
+    const std::size_t count = std::min(kChunk, rows - begin);
+    std::fill_n(probe, count, 0.0);
+    for (const std::span<const double> column : columns)
+      for (std::size_t i = 0; i < count; ++i) probe[i] += 0.0 * column[begin + i];
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool usable = probe[i] == 0.0;
+      if (usable && !open) out.push_back({begin + i, rows});
+      if (!usable && open) out.back().end = begin + i;
+      open = usable;
+    }
+  }
+  return out;
+}
+
+void append(std::vector<double>& to, std::span<const double> from, const Segment& part) {
+  if (from.empty())
+    to.insert(to.end(), part.end - part.begin, 0.0);
+  else
+    to.insert(to.end(), from.begin() + static_cast<std::ptrdiff_t>(part.begin),
+              from.begin() + static_cast<std::ptrdiff_t>(part.end));
+}
+
+}  // namespace
+
 JointRows make_rows(std::span<const JointRun> runs, const JointTerms& terms, const RowRecipe& recipe) {
   JointRows out;
   const std::size_t terms_count = terms.linear().size();
@@ -227,51 +307,75 @@ JointRows make_rows(std::span<const JointRun> runs, const JointTerms& terms, con
   const series::LocalPolynomial polynomial{.window = recipe.window, .order = recipe.order};
   const std::vector<double> low_pass = series::implied_low_pass(polynomial);
   std::vector<RunColumns> all;
-  for (const JointRun& run : runs) all.push_back(columns_of(run, terms, recipe));
+  std::size_t total = 0;
+  for (const JointRun& run : runs) {
+    all.push_back(columns_of(run, terms, recipe));
+    total += run.time.size();
+  }
+  out.time.reserve(total);
+  out.output.reserve(total);
+  for (auto& column : out.input) column.reserve(total);
+  for (auto& column : out.plain) column.reserve(total);
+  for (auto& column : out.filtered) column.reserve(total);
+  if (recipe.parallel_filter) out.filtered_output.reserve(total);
   const bool clean = recipe.parallel_filter && recipe.clean_spikes;
   const Eigen::VectorXd pilot = clean ? pilot_fit(all, terms_count) : Eigen::VectorXd();
+  std::vector<std::vector<double>> filtered(recipe.parallel_filter ? terms_count : 0);
   for (std::size_t r = 0; r < runs.size(); ++r) {
     const JointRun& run = runs[r];
     const std::size_t rows = run.time.size();
     out.seen += rows;
-    const RunColumns& columns = all[r];
-    std::vector<double> cleaned;
+    RunColumns& columns = all[r];
+    std::vector<double> cleaned, filtered_output;
+    std::vector<std::span<const double>> needed{columns.y, columns.input[1], columns.input[0]};
     if (recipe.parallel_filter) {
-      cleaned = columns.y;
+      cleaned.assign(columns.y.begin(), columns.y.end());
       if (clean) out.cleaned += remove_spikes(columns, pilot, cleaned);
-    }
-    std::vector<std::vector<double>> filtered;
-    std::vector<double> filtered_output;
-    if (recipe.parallel_filter) {
-      for (std::size_t k = 0; k < terms_count; ++k)
-        filtered.push_back(series::convolve(columns.x[k], low_pass, columns.segments));
+      for (std::size_t k = 0; k < terms_count; ++k) {
+        filtered[k] = series::convolve(columns.x[k], low_pass, columns.segments);
+        needed.push_back(columns.x[k]);
+        needed.push_back(filtered[k]);
+      }
       filtered_output = series::convolve(cleaned, low_pass, columns.segments);
+      needed.push_back(filtered_output);
+    } else {
+      columns.x.assign(terms_count, {});
+      for (std::size_t k = 0; k < terms_count; ++k) {
+        const Proportional p = proportional(terms, k);  // its input says whether it is finite
+        const bool simple = p.input >= 0 || terms.is_cubic_damping(k);
+        const int z = p.input >= 0 ? p.input : static_cast<int>(Input::kVelocity);
+        if (simple && !columns.input[z].empty()) needed.push_back(columns.input[z]);
+        if (simple) continue;
+        columns.x[k].resize(rows);
+        fill_regressor(columns, terms, recipe, k, 0, rows, columns.x[k].data());
+        needed.push_back(columns.x[k]);
+      }
     }
+    if (!terms.nonlinear().empty())
+      for (const auto& input : columns.input)
+        if (!input.empty()) needed.push_back(input);
     RunRows span{.name = run.name,
                  .begin = out.size(),
                  .end = 0,
                  .interval = columns.interval,
-                 .noise = columns.noise};
+                 .noise = columns.noise,
+                 .resting = columns.resting};
     const double origin = rows > 0 ? run.time.front() : 0.0;
-    for (std::size_t i = 0; i < rows; ++i) {
-      bool usable = std::isfinite(columns.y[i]) && std::isfinite(columns.input[1][i]) &&
-                    std::isfinite(columns.input[0][i]);
-      for (std::size_t k = 0; k < terms_count && usable; ++k) usable = std::isfinite(columns.x[k][i]);
-      if (recipe.parallel_filter && usable) {
-        usable = std::isfinite(filtered_output[i]);
-        for (std::size_t k = 0; k < terms_count && usable; ++k) usable = std::isfinite(filtered[k][i]);
+    for (const Segment& part : usable_rows(needed, rows)) {
+      for (std::size_t i = part.begin; i < part.end; ++i) out.time.push_back(run.time[i] - origin);
+      for (int z = 0; z < kInputs; ++z) append(out.input[z], columns.input[z], part);
+      append(out.output, columns.y, part);
+      for (std::size_t k = 0; k < terms_count; ++k) {
+        if (!columns.x[k].empty()) {
+          append(out.plain[k], columns.x[k], part);
+        } else {
+          out.plain[k].resize(out.time.size());
+          fill_regressor(columns, terms, recipe, k, part.begin, part.end,
+                         out.plain[k].data() + out.time.size() - (part.end - part.begin));
+        }
+        if (recipe.parallel_filter) append(out.filtered[k], filtered[k], part);
       }
-      if (!terms.nonlinear().empty())
-        for (int z = 0; z < kInputs && usable; ++z) usable = std::isfinite(columns.input[z][i]);
-      if (!usable) continue;
-      out.time.push_back(run.time[i] - origin);
-      for (int z = 0; z < kInputs; ++z) out.input[z].push_back(columns.input[z][i]);
-      out.output.push_back(columns.y[i]);
-      for (std::size_t k = 0; k < terms_count; ++k) out.plain[k].push_back(columns.x[k][i]);
-      if (recipe.parallel_filter) {
-        for (std::size_t k = 0; k < terms_count; ++k) out.filtered[k].push_back(filtered[k][i]);
-        out.filtered_output.push_back(filtered_output[i]);
-      }
+      if (recipe.parallel_filter) append(out.filtered_output, filtered_output, part);
     }
     span.end = out.size();
     out.runs.push_back(std::move(span));
@@ -416,6 +520,38 @@ std::vector<double> prediction_variance(const JointRows& rows, const JointTerms&
               sensitivity_at(terms, s, state, sigma[static_cast<int>(s.input)]);
       for (const double p : part) out[i] += p * p;
     }
+  }
+  return out;
+}
+
+std::vector<double> angle_slope(const JointRows& rows, const JointTerms& terms, const Eigen::VectorXd& theta,
+                                double half_step) {
+  double constant = 0;
+  std::vector<std::size_t> varying;
+  for (std::size_t k = 0; k < terms.linear().size(); ++k) {
+    if (!terms.reads(k, Input::kAngle)) continue;
+    if (constant_slope(terms, k, Input::kAngle))
+      constant +=
+          theta[static_cast<Eigen::Index>(k)] * slope(terms, k, {}, Input::kAngle, half_step) / half_step;
+    else
+      varying.push_back(k);
+  }
+  std::vector<double> out(rows.size(), constant);
+  const std::size_t linear = terms.linear().size();
+  const bool bent = !terms.nonlinear().empty() && terms.reads(Input::kAngle);
+  if (varying.empty() && !bent) return out;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const JointState state = rows.state(i);
+    for (const std::size_t k : varying)
+      out[i] +=
+          theta[static_cast<Eigen::Index>(k)] * slope(terms, k, state, Input::kAngle, half_step) / half_step;
+    if (!bent) continue;
+    JointState up = state, down = state;
+    up.angle += half_step;
+    down.angle -= half_step;
+    out[i] += (terms.nonlinear_value(up, theta.data() + linear, nullptr) -
+               terms.nonlinear_value(down, theta.data() + linear, nullptr)) /
+              (2.0 * half_step);
   }
   return out;
 }

@@ -33,6 +33,8 @@ struct RowRecipe {
   bool parallel_filter = true;
   bool unbiased_cube = true;  ///< x_C = v̂³ − 3σ²v̂
   double angle_noise = 0;     ///< per sample
+  double angle_step = 0;      ///< of the encoder; 0: not quantised, or not to be allowed for
+  double output_lag = 0;      ///< s; the output is read as much later
   double delta_pressure_noise = 0;
   bool clean_spikes = true;
 };
@@ -42,6 +44,7 @@ struct RunRows {
   std::size_t begin = 0, end = 0;  ///< rows of this run
   double interval = 0;             ///< s
   RowNoise noise;
+  bool resting = false;  ///< the angle stays within about one encoder step: one error for all rows
 };
 
 /// Usable rows of several runs, column by column.
@@ -71,6 +74,17 @@ struct JointRows {
 /// Variance of the prediction from noise of the regressors, row by row, in units of the output squared.
 [[nodiscard]] std::vector<double> prediction_variance(const JointRows& rows, const JointTerms& terms,
                                                       const Eigen::VectorXd& theta);
+
+/// ∂(prediction)/∂(angle) row by row, by the half difference over ± `half_step`.
+[[nodiscard]] std::vector<double> angle_slope(const JointRows& rows, const JointTerms& terms,
+                                              const Eigen::VectorXd& theta, double half_step);
+
+/// Does the angle stay within about one step?
+[[nodiscard]] bool rests(double lowest, double highest, double step) noexcept;
+
+/// y(t + lag) by straight lines between samples; NaN where a neighbour is missing, at a gap and at the end.
+[[nodiscard]] std::vector<double> advanced(std::span<const double> time, std::span<const double> signal,
+                                           double lag, double interval);
 
 /// Prediction from unfiltered regressors.
 [[nodiscard]] std::vector<double> predict(const JointRows& rows, const JointTerms& terms,

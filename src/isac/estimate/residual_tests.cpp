@@ -25,8 +25,19 @@ struct Group {
   const char* name;
   const char* input;
   const char* hint;
+  const char* term;  ///< of the catalogue, which would describe it
   std::vector<Candidate> candidates;
 };
+
+/// What to call so that the term is fitted along.
+std::string with_term(const JointFitOptions& options, const char* term) {
+  std::string out = "--terms ";
+  for (const std::string& known : options.terms) {
+    if (known == term) return "other terms of the catalogue (docs/effects.md)";
+    out += known + ",";
+  }
+  return out + term;
+}
 
 ResidualTest whiteness(const JointRows& rows, std::span<const double> residual, int window) {
   std::vector<std::vector<double>> pieces;
@@ -63,10 +74,10 @@ ResidualTest whiteness(const JointRows& rows, std::span<const double> residual, 
 
 }  // namespace
 
-std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const double* const> used,
-                                         std::span<const double> residual, std::span<const double> omega,
+std::vector<ResidualTest> residual_tests(const JointRows& rows, const FittedRows& fitted,
                                          std::span<const BlockRange> blocks, int window,
                                          const JointFitOptions& options) {
+  const std::span<const double> residual = fitted.residual, omega = fitted.omega;
   std::vector<ResidualTest> out;
   if (rows.size() == 0) return out;
   out.push_back(whiteness(rows, residual, window));
@@ -82,12 +93,19 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
       block_of.push_back(b);
     }
   const auto n = static_cast<Eigen::Index>(index.size());
-  const auto p = static_cast<Eigen::Index>(used.size());
+  const auto own = static_cast<Eigen::Index>(fitted.used.size());
+  const auto zeros = static_cast<Eigen::Index>(fitted.zero.empty() ? 0 : 1 + fitted.resting.size());
+  const Eigen::Index p = own + zeros;
   Eigen::MatrixXd x(n, p);
   Eigen::VectorXd w(n), r(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const std::size_t row = index[static_cast<std::size_t>(i)];
-    for (Eigen::Index k = 0; k < p; ++k) x(i, k) = used[static_cast<std::size_t>(k)][row];
+    for (Eigen::Index k = 0; k < own; ++k) x(i, k) = fitted.used[static_cast<std::size_t>(k)][row];
+    if (zeros > 0) x(i, own) = fitted.zero[row];
+    for (Eigen::Index k = own + 1; k < p; ++k) {
+      const RobustProblem::Local& run = fitted.resting[static_cast<std::size_t>(k - own - 1)];
+      x(i, k) = row >= run.begin && row < run.end ? fitted.zero[row] : 0.0;
+    }
     w[i] = omega[row];
     r[i] = residual[row];
   }
@@ -107,12 +125,14 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
       {"residual_against_angle",
        "the angle",
        "stiffness that is not a straight line, or a slack muscle",
+       "cubic_stiffness",
        {{"angle", column([](const JointState& s) { return s.angle; })},
         {"square of the angle", column([](const JointState& s) { return s.angle * s.angle; })},
         {"cube of the angle", column([](const JointState& s) { return s.angle * s.angle * s.angle; })}}});
   groups.push_back({"residual_against_velocity",
                     "the velocity",
                     "damping of another law",
+                    "quadratic_damping",
                     {{"velocity", column([](const JointState& s) { return s.velocity; })},
                      {"velocity times its size",
                       column([](const JointState& s) { return s.velocity * std::abs(s.velocity); })},
@@ -121,12 +141,14 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
   groups.push_back({"residual_against_direction",
                     "the direction of motion",
                     "Coulomb friction or hysteresis",
+                    "coulomb_friction",
                     {{"direction", column([](const JointState& s) {
                         return s.velocity > 0 ? 1.0 : s.velocity < 0 ? -1.0 : 0.0;
                       })}}});
   groups.push_back({"residual_against_pressure",
                     "the pressure difference",
                     "torque that is not linear in pressure",
+                    "nonlinear_pressure_gain",
                     {{"pressure difference", column([](const JointState& s) { return s.delta_pressure; })},
                      {"square of the pressure difference",
                       column([](const JointState& s) { return s.delta_pressure * s.delta_pressure; })},
@@ -138,6 +160,7 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
   groups.push_back({"residual_against_mean_pressure",
                     "the mean pressure",
                     "unequal muscles, or stiffness with pressure",
+                    "pressure_dependent_stiffness",
                     {{"mean pressure", column([p0](const JointState& s) {
                         return s.mean_pressure == 0.0 ? 0.0 : s.mean_pressure - p0;
                       })},
@@ -147,10 +170,12 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
   groups.push_back({"residual_against_constant",
                     "a constant",
                     "an offset of the sensors or the torque",
+                    "offset",
                     {{"constant", column([](const JointState&) { return 1.0; })}}});
   groups.push_back({"residual_against_time",
                     "the time since the start",
                     "drift or creep",
+                    "thermal_drift",
                     {{"time", column([](const JointState& s) { return s.time; })}}});
 
   const auto [low, high] = std::minmax_element(rows.output.begin(), rows.output.end());
@@ -192,13 +217,15 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, std::span<const 
         !follows ? fmt::format("The residual does not follow {} (p = {:.2g}).", group.input, test.p_value)
         : test.passed
             ? fmt::format(
-                  "The residual follows {} only by {:.1g} {} rms ({}, p = {:.1g}), less than a thousandth of "
-                  "the "
-                  "output's range: significant, not important.",
-                  group.input, best_size, options.output_unit, best_words, test.p_value)
+                  "The residual follows {} by {:.1g} {} rms, less than a thousandth of the output's range: "
+                  "many rows "
+                  "show it, no use of the model does.",
+                  group.input, best_size, options.output_unit)
             : fmt::format(
-                  "The residual still follows {} ({}, {:.2g} {} rms, p = {:.1g}): the model may miss {}.",
-                  group.input, best_words, best_size, options.output_unit, test.p_value, group.hint);
+                  "The residual still follows {} ({}, {:.2g} {} rms, p = {:.1g}): the model may miss {}; try "
+                  "{}.",
+                  group.input, best_words, best_size, options.output_unit, test.p_value, group.hint,
+                  with_term(options, group.term));
     out.push_back(std::move(test));
   }
   return out;

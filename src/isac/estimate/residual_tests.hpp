@@ -16,6 +16,7 @@
 
 #include "isac/estimate/joint_fit.hpp"
 #include "isac/estimate/joint_rows.hpp"
+#include "isac/estimate/robust.hpp"
 
 namespace isac::estimate {
 
@@ -24,11 +25,15 @@ struct BlockRange {
   std::size_t begin = 0, end = 0;
 };
 
-/// `residual` and `omega` per row, `used` the fitted columns.
-[[nodiscard]] std::vector<ResidualTest> residual_tests(const JointRows& rows,
-                                                       std::span<const double* const> used,
-                                                       std::span<const double> residual,
-                                                       std::span<const double> omega,
+/// What was fitted and what it left over.
+struct FittedRows {
+  std::span<const double* const> used;            ///< columns of the parameters
+  std::span<const double> zero;                   ///< column of the angle's zero, or empty
+  std::span<const RobustProblem::Local> resting;  ///< rows that have a zero of their own besides
+  std::span<const double> residual, omega;        ///< per row
+};
+
+[[nodiscard]] std::vector<ResidualTest> residual_tests(const JointRows& rows, const FittedRows& fitted,
                                                        std::span<const BlockRange> blocks, int window,
                                                        const JointFitOptions& options);
 

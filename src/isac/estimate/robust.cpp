@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "isac/estimate/robust_pass.hpp"
 
@@ -110,7 +111,49 @@ void RobustProblem::linearise(const Eigen::VectorXd& theta) const {
 
 Pass RobustProblem::pass(const Eigen::VectorXd& theta, std::size_t begin, std::size_t end, bool with_gram,
                          bool with_curvature) const {
+  if (locals.empty()) return plain_pass(theta.data(), begin, end, with_gram, with_curvature);
   const int n = size();
+  const auto own = static_cast<int>(columns.size());
+  Pass out;
+  out.moment = Eigen::VectorXd::Zero(n);
+  if (with_gram) out.gram = Eigen::MatrixXd::Zero(n, n);
+  if (with_curvature) out.curvature = Eigen::MatrixXd::Zero(n, n);
+  std::vector<double> here(theta.data(), theta.data() + own);
+  const auto stretch = [&](std::size_t first, std::size_t last, int local) {
+    if (first >= last) return;
+    here.back() = theta[own - 1] + (local >= 0 ? theta[own + local] : 0.0);
+    const Pass part = plain_pass(here.data(), first, last, with_gram, with_curvature);
+    // Place in the part and in the whole; in a local's rows the last column goes to two places.
+    std::vector<std::pair<int, int>> place;
+    for (int k = 0; k < own; ++k) place.emplace_back(k, k);
+    if (local >= 0) place.emplace_back(own - 1, own + local);
+    for (int k = own; k < part.moment.size(); ++k) place.emplace_back(k, k + static_cast<int>(locals.size()));
+    for (const auto& [i, a] : place) {
+      out.moment[a] += part.moment[i];
+      for (const auto& [j, b] : place) {
+        if (with_gram) out.gram(a, b) += part.gram(i, j);
+        if (with_curvature) out.curvature(a, b) += part.curvature(i, j);
+      }
+    }
+    out.cost += part.cost;
+    out.weight += part.weight;
+  };
+  std::size_t done = begin;
+  for (std::size_t k = 0; k < locals.size(); ++k) {
+    const std::size_t first = std::clamp(locals[k].begin, done, std::max(done, end)),
+                      last = std::clamp(locals[k].end, first, std::max(first, end));
+    stretch(done, first, -1);
+    stretch(first, last, static_cast<int>(k));
+    done = last;
+  }
+  stretch(done, end, -1);
+  return out;
+}
+
+Pass RobustProblem::plain_pass(const double* theta, std::size_t begin, std::size_t end, bool with_gram,
+                               bool with_curvature) const {
+  const auto own = static_cast<int>(columns.size());
+  const int n = own + static_cast<int>(nonlinear.start.size());
   std::vector<const double*> all = columns;
   for (const auto& column : derivatives_) all.push_back(column.data());
   const int pairs = n * (n + 1) / 2;
@@ -119,10 +162,10 @@ Pass RobustProblem::pass(const Eigen::VectorXd& theta, std::size_t begin, std::s
   std::vector<double> total(count, 0.0);
   const detail::BatchInput in{.columns = all.data(),
                               .size = n,
-                              .linear = linear_size(),
+                              .linear = own,
                               .output = nonlinear.start.empty() ? output : remainder_.data(),
                               .weight = weight,
-                              .theta = theta.data(),
+                              .theta = theta,
                               .scale = scale,
                               .kind = static_cast<int>(kind),
                               .with_gram = with_gram,
@@ -158,9 +201,14 @@ Pass RobustProblem::pass(const Eigen::VectorXd& theta, std::size_t begin, std::s
 void RobustProblem::residuals(const Eigen::VectorXd& theta, std::vector<double>& out) const {
   const double* base = nonlinear.start.empty() ? output : remainder_.data();
   out.assign(base, base + rows);
-  for (int k = 0; k < linear_size(); ++k) {
-    const double* x = columns[static_cast<std::size_t>(k)];
-    for (std::size_t i = 0; i < rows; ++i) out[i] -= theta[k] * x[i];
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const double* x = columns[k];
+    const double value = theta[static_cast<Eigen::Index>(k)];
+    for (std::size_t i = 0; i < rows; ++i) out[i] -= value * x[i];
+  }
+  for (std::size_t k = 0; k < locals.size(); ++k) {
+    const double value = theta[static_cast<Eigen::Index>(columns.size() + k)];
+    for (std::size_t i = locals[k].begin; i < locals[k].end; ++i) out[i] -= value * columns.back()[i];
   }
 }
 

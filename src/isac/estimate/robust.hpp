@@ -41,7 +41,14 @@ class RobustProblem {
   const double* weight = nullptr;  ///< w, or nullptr for one
   Loss::Kind kind = Loss::Kind::kSquared;
   double scale = 1;        ///< c
-  Eigen::MatrixXd excess;  ///< S; empty for none
+  Eigen::MatrixXd excess;  ///< S, less the weight of priors on its diagonal; empty for none
+
+  /// A coefficient that the last linear column has besides its own in rows [begin, end) only: what a run adds for itself. Its
+  /// parameters stand behind those of the columns, in the order of this list, which is the order of the rows.
+  struct Local {
+    std::size_t begin = 0, end = 0;
+  };
+  std::vector<Local> locals;
 
   /// Nonlinear part: fills `prediction` (rows) and its derivative columns for the parameters given.
   struct Nonlinear {
@@ -52,7 +59,7 @@ class RobustProblem {
   };
   Nonlinear nonlinear;
 
-  [[nodiscard]] int linear_size() const { return static_cast<int>(columns.size()); }
+  [[nodiscard]] int linear_size() const { return static_cast<int>(columns.size() + locals.size()); }
   [[nodiscard]] int size() const { return linear_size() + static_cast<int>(nonlinear.start.size()); }
 
   /// Evaluates the nonlinear part at `theta` (nothing to do for linear problems), for the calls below.
@@ -63,6 +70,9 @@ class RobustProblem {
   void residuals(const Eigen::VectorXd& theta, std::vector<double>& out) const;
 
  private:
+  /// Pass over columns and nonlinear derivatives, without locals.
+  [[nodiscard]] Pass plain_pass(const double* theta, std::size_t begin, std::size_t end, bool with_gram,
+                                bool with_curvature) const;
   mutable std::vector<double> remainder_;  ///< output minus nonlinear prediction
   mutable std::vector<double> prediction_;
   mutable std::vector<std::vector<double>> derivatives_;

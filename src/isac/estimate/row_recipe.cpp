@@ -21,19 +21,23 @@ StatedRecipe choose_recipe(std::span<const JointRun> runs, const JointTerms& ter
   recipe.clean_spikes = options.loss.kind != Loss::Kind::kSquared;
   recipe.unbiased_cube = careful;
 
+  recipe.output_lag = options.output_lag;
   std::vector<double> angle_noise, pressure_noise;
+  double seen_step = 0;
   int narrowest = 0;
   double interval = std::nan("");
   for (const JointRun& run : runs) {
     if (run.time.size() < 8) continue;
     interval = series::median_interval(run.time);
-    if (recipe.window == 0 || (careful && !std::isfinite(options.noise.angle))) {
+    const bool asks_step = careful && run.velocity.empty() && !std::isfinite(options.noise.angle_step);
+    if (recipe.window == 0 || asks_step || (careful && !std::isfinite(options.noise.angle))) {
       const bool measured = !run.velocity.empty();
       const series::WindowChoice choice =
           series::choose_window(run.time, measured ? run.velocity : run.angle, recipe.order,
                                 measured ? std::nan("") : options.noise.angle);
       if (narrowest == 0 || choice.polynomial.window < narrowest) narrowest = choice.polynomial.window;
       if (!measured) angle_noise.push_back(choice.noise);
+      if (!measured) seen_step = std::max(seen_step, choice.step);
     }
     if (careful && !run.delta_pressure.empty() && terms.reads(Input::kDeltaPressure) &&
         !std::isfinite(options.noise.delta_pressure))
@@ -47,6 +51,7 @@ StatedRecipe choose_recipe(std::span<const JointRun> runs, const JointTerms& ter
       return std::isfinite(middle) ? middle : 0.0;
     };
     recipe.angle_noise = chosen(options.noise.angle, angle_noise);
+    recipe.angle_step = std::isfinite(options.noise.angle_step) ? options.noise.angle_step : seen_step;
     recipe.delta_pressure_noise = chosen(options.noise.delta_pressure, pressure_noise);
   }
   const series::NoiseGain gain =

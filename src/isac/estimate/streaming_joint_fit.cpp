@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "isac/core/error.hpp"
 #include "isac/estimate/block_covariance.hpp"
@@ -34,7 +35,37 @@ struct OpenBlock {
   BlockSums sums;
   Eigen::MatrixXd gram;
   std::size_t rows = 0;
+  std::size_t run = 0;
+  void add(const OpenBlock& other) {
+    sums.score += other.sums.score;
+    sums.curvature += other.sums.curvature;
+    gram += other.gram;
+    rows += other.rows;
+  }
 };
+
+struct AngleRange {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+};
+
+/// The sums of the angle's zero stand last; those of a resting run's own zero are the same sums over its blocks.
+Eigen::VectorXd with_own(const Eigen::VectorXd& sums, Eigen::Index runs, Eigen::Index own) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(sums.size() + runs);
+  out.head(sums.size()) = sums;
+  if (own >= 0) out[sums.size() + own] = sums[sums.size() - 1];
+  return out;
+}
+
+Eigen::MatrixXd with_own(const Eigen::MatrixXd& sums, Eigen::Index runs, Eigen::Index own) {
+  const Eigen::Index n = sums.rows();
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(n + runs, n + runs);
+  out.topLeftCorner(n, n) = sums;
+  if (own < 0) return out;
+  out.row(n + own).head(n) = sums.row(n - 1);
+  out.col(n + own).head(n) = sums.col(n - 1);
+  out(n + own, n + own) = sums(n - 1, n - 1);
+  return out;
+}
 
 }  // namespace
 
@@ -49,13 +80,16 @@ struct StreamingJointFit::State {
 
   StatedRecipe stated;
   JointCore pilot;
-  Eigen::VectorXd start;  ///< θ₀ of the kept columns
+  Eigen::VectorXd start;  ///< θ₀ of the kept columns, and of the angle's zero behind them
+  bool zero = false;
   Loss loss;
+  double pilot_interval = 0;
   double base = 0;  ///< variance of the output's own noise, for the weights
   std::size_t block_rows = 1;
 
   JointRun carry;  ///< the last rows of the run, which the next block's window needs
   std::vector<OpenBlock> blocks;
+  std::vector<AngleRange> ranges;  ///< of the runs
   bool open = false;
   Eigen::MatrixXd plain_gram;
   Eigen::VectorXd plain_moment;
@@ -78,16 +112,19 @@ struct StreamingJointFit::State {
       throw Error(ErrorKind::kAnswerIsNo, "no_usable_data",
                   "the first rows cannot be used: time, angle and output must be there together over more "
                   "than a window; mend the missing samples or add more rows");
-    pilot = estimate_joint(first, terms, options, stated.recipe.window);
+    pilot = estimate_joint(first, terms, options, stated.recipe);
     const auto size = static_cast<Eigen::Index>(pilot.rank.kept.size());
-    start.resize(size);
+    zero = pilot.zero.slope != 0;
+    start.resize(size + (zero ? 1 : 0));
     for (Eigen::Index j = 0; j < size; ++j)
       start[j] = pilot.theta[pilot.rank.kept[static_cast<std::size_t>(j)]];
+    if (zero) start[size] = pilot.zero.value;
     loss = options.loss;
     if (!std::isfinite(loss.scale))
       loss.scale = pilot.spread * (loss.kind == Loss::Kind::kCauchy ? 2.385 : 1.345);
     double interval = 0;
     for (const RunRows& run : first.runs) interval = std::max(interval, run.interval);
+    pilot_interval = interval;
     block_rows =
         std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(pilot.block_seconds / interval)));
     base = pilot.spread * pilot.spread;
@@ -111,15 +148,29 @@ struct StreamingJointFit::State {
     return stated.recipe.parallel_filter ? 2 * half : half;
   }
 
+  /// The same at the end, where a late output takes away rows too.
+  std::size_t tail() const {
+    if (!(stated.recipe.output_lag > 0)) return halo();
+    const auto late = static_cast<std::size_t>(std::ceil(stated.recipe.output_lag / pilot_interval)) + 1;
+    const auto half = static_cast<std::size_t>(stated.recipe.window / 2);
+    return std::max(halo(), stated.recipe.parallel_filter ? half + late : late);
+  }
+
   void consume(const JointRun& block) {
     if (carry.name != block.name) {
       carry = JointRun{};
       carry.name = block.name;
       open = false;
+      ranges.emplace_back();
     }
     append(carry, block);
+    for (const double angle : block.angle) {
+      if (!std::isfinite(angle)) continue;
+      ranges.back().low = std::min(ranges.back().low, angle);
+      ranges.back().high = std::max(ranges.back().high, angle);
+    }
     seen += block.time.size();
-    const std::size_t keep = 2 * halo();
+    const std::size_t keep = halo() + tail();
     if (carry.time.size() <= keep) return;
     add_rows(make_rows(std::span<const JointRun>(&carry, 1), terms, stated.recipe));
     JointRun rest;
@@ -135,6 +186,11 @@ struct StreamingJointFit::State {
     for (const int k : pilot.rank.kept) {
       problem.columns.push_back(fresh.x(static_cast<std::size_t>(k)).data());
       plain.columns.push_back(fresh.plain[static_cast<std::size_t>(k)].data());
+    }
+    std::vector<double> by_angle;
+    if (zero) {
+      by_angle = angle_slope(fresh, terms, pilot.theta, pilot.zero.half_step);
+      problem.columns.push_back(by_angle.data());
     }
     problem.output = fresh.y().data();
     plain.output = fresh.output.data();
@@ -169,9 +225,10 @@ struct StreamingJointFit::State {
       block.gram += pass.gram;
       if (options.errors_in_variables) {
         const Eigen::MatrixXd all = noise_gram(fresh, terms, omega.data(), i, end);
-        Eigen::MatrixXd excess(start.size(), start.size());
-        for (Eigen::Index a = 0; a < start.size(); ++a)
-          for (Eigen::Index b = 0; b < start.size(); ++b)
+        const auto kept = static_cast<Eigen::Index>(pilot.rank.kept.size());
+        Eigen::MatrixXd excess = Eigen::MatrixXd::Zero(start.size(), start.size());
+        for (Eigen::Index a = 0; a < kept; ++a)
+          for (Eigen::Index b = 0; b < kept; ++b)
             excess(a, b) = all(pilot.rank.kept[static_cast<std::size_t>(a)],
                                pilot.rank.kept[static_cast<std::size_t>(b)]);
         block.sums.score += excess * start;
@@ -180,7 +237,7 @@ struct StreamingJointFit::State {
       block.rows += end - i;
       i = end;
     }
-    const Pass pass = plain.pass(start, 0, plain.rows, true, false);
+    const Pass pass = plain.pass(start.head(plain_moment.size()), 0, plain.rows, true, false);
     plain_gram += pass.gram;
     plain_moment += pass.moment;
     plain_square += pass.cost;
@@ -190,19 +247,19 @@ struct StreamingJointFit::State {
 
   void begin_block() {
     if (blocks.size() >= kMostBlocks) {  // twice as long blocks, half as many
-      for (std::size_t b = 0; b + 1 < blocks.size(); b += 2) {
-        blocks[b].sums.score += blocks[b + 1].sums.score;
-        blocks[b].sums.curvature += blocks[b + 1].sums.curvature;
-        blocks[b].gram += blocks[b + 1].gram;
-        blocks[b].rows += blocks[b + 1].rows;
-        blocks[b / 2] = blocks[b];
+      std::size_t kept = 0;
+      for (std::size_t b = 0; b < blocks.size(); ++kept) {
+        blocks[kept] = std::move(blocks[b++]);
+        if (b < blocks.size() && blocks[b].run == blocks[kept].run) blocks[kept].add(blocks[b++]);
       }
-      blocks.resize(blocks.size() / 2);
+      blocks.resize(kept);
       block_rows *= 2;
     }
     const Eigen::Index n = start.size();
-    blocks.push_back(
-        {{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)}, Eigen::MatrixXd::Zero(n, n), 0});
+    blocks.push_back({{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)},
+                      Eigen::MatrixXd::Zero(n, n),
+                      0,
+                      ranges.size() - 1});
     open = true;
   }
 
@@ -260,11 +317,13 @@ StreamingJointFit StreamingJointFit::fork() const {
   to.stated = from.stated;
   to.pilot = from.pilot;
   to.start = from.start;
+  to.zero = from.zero;
+  to.pilot_interval = from.pilot_interval;
   to.loss = from.loss;
   to.base = from.base;
   to.block_rows = from.block_rows;
-  to.plain_gram = Eigen::MatrixXd::Zero(from.start.size(), from.start.size());
-  to.plain_moment = Eigen::VectorXd::Zero(from.start.size());
+  to.plain_gram = Eigen::MatrixXd::Zero(from.plain_gram.rows(), from.plain_gram.cols());
+  to.plain_moment = Eigen::VectorXd::Zero(from.plain_moment.size());
   to.clear_sample();
   to.ready = from.ready;
   return out;
@@ -274,7 +333,9 @@ void StreamingJointFit::merge(StreamingJointFit& other) {
   State& s = *state_;
   State& o = *other.state_;
   s.open = false;
+  for (OpenBlock& block : o.blocks) block.run += s.ranges.size();
   s.blocks.insert(s.blocks.end(), o.blocks.begin(), o.blocks.end());
+  s.ranges.insert(s.ranges.end(), o.ranges.begin(), o.ranges.end());
   s.plain_gram += o.plain_gram;
   s.plain_moment += o.plain_moment;
   s.plain_square += o.plain_square;
@@ -287,9 +348,26 @@ void StreamingJointFit::merge(StreamingJointFit& other) {
 JointFit StreamingJointFit::finish() {
   State& s = *state_;
   if (!s.ready) s.make_pilot();
-  const Eigen::Index n = s.start.size();
+  std::vector<Eigen::Index> own(s.ranges.size(), -1);  // the zero of a resting run of its own
+  Eigen::Index resting = 0;
+  if (s.zero)
+    for (std::size_t r = 0; r < own.size(); ++r)
+      if (rests(s.ranges[r].low, s.ranges[r].high, s.stated.recipe.angle_step)) own[r] = resting++;
+  if (s.zero) {
+    s.pilot.zero.resting.assign(static_cast<std::size_t>(resting), {});
+    for (OpenBlock& block : s.blocks) {
+      block.sums.score = with_own(block.sums.score, resting, own[block.run]);
+      block.sums.curvature = with_own(block.sums.curvature, resting, own[block.run]);
+      block.gram = with_own(block.gram, resting, own[block.run]);
+    }
+    s.start.conservativeResizeLike(Eigen::VectorXd::Zero(s.start.size() + resting));
+  }
+  const Eigen::Index n = s.start.size(), known = static_cast<Eigen::Index>(s.pilot.rank.kept.size());
+  Prior prior = prior_of(s.pilot.zero, s.pilot.rank.kept.size(), static_cast<int>(n), s.pilot.spread);
   Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n), gram = bread;
-  Eigen::VectorXd score = Eigen::VectorXd::Zero(n);
+  Eigen::VectorXd score = -prior.curvature.cwiseProduct(s.start);
+  bread.diagonal() += prior.curvature;
+  gram.diagonal() += prior.curvature;
   for (const OpenBlock& block : s.blocks) {
     bread += block.sums.curvature;
     gram += block.gram;
@@ -302,19 +380,25 @@ JointFit StreamingJointFit::finish() {
   for (const OpenBlock& block : s.blocks)
     sums.push_back({scale.cwiseProduct(block.sums.score - block.sums.curvature * step),
                     scale.asDiagonal() * block.sums.curvature * scale.asDiagonal()});
-  const BlockCovariance covariance = block_covariance(sums);
+  prior.curvature = prior.curvature.cwiseProduct(scale).cwiseProduct(scale);
+  prior.score_variance = prior.score_variance.cwiseProduct(scale).cwiseProduct(scale);
+  const BlockCovariance covariance = block_covariance(sums, prior);
   const Eigen::VectorXd inflation = n > 0 ? variance_inflation(gram) : Eigen::VectorXd();
 
   JointCore core = s.pilot;
   core.converged = true;
-  for (Eigen::Index i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < known; ++i) {
     const int a = s.pilot.rank.kept[static_cast<std::size_t>(i)];
     core.theta[a] = s.start[i] + step[i];
     core.degrees_of_freedom[a] = covariance.degrees_of_freedom[i];
     core.inflation[a] = inflation[i];
-    for (Eigen::Index j = 0; j < n; ++j)
+    for (Eigen::Index j = 0; j < known; ++j)
       core.covariance(a, s.pilot.rank.kept[static_cast<std::size_t>(j)]) =
           covariance.covariance(i, j) * scale[i] * scale[j];
+  }
+  if (s.zero) {
+    core.zero.value = s.start[known] + step[known];
+    core.zero.std_error = std::sqrt(covariance.covariance(known, known)) * scale[known];
   }
   core.outliers = s.outliers;
   core.blocks.assign(s.blocks.size(), {});
@@ -339,7 +423,10 @@ JointFit StreamingJointFit::finish() {
         fit.correlation[i * order.size() + j] =
             core.covariance(order[i], order[j]) /
             std::sqrt(core.covariance(order[i], order[i]) * core.covariance(order[j], order[j]));
-  const double square = s.plain_square - 2.0 * step.dot(s.plain_moment) + step.dot(s.plain_gram * step);
+  fit.angle_zero = angle_zero(core.zero, s.options);
+  if (fit.angle_zero.used) fit.tests.push_back(zero_test(fit.angle_zero, core.zero, s.options));
+  const Eigen::VectorXd moved = step.head(known);
+  const double square = s.plain_square - 2.0 * moved.dot(s.plain_moment) + moved.dot(s.plain_gram * moved);
   fit.rmse = s.rows > 0 ? std::sqrt(std::max(0.0, square) / static_cast<double>(s.rows)) : std::nan("");
   s.sample.seen = s.sample.size();
   add_warnings(s.sample, s.terms, core, s.options, fit);

@@ -55,11 +55,12 @@ void read_encoder(const toml::table& table, const std::string& file, RigEncoder&
 
 void read_sensors(const toml::table& table, const std::string& file, RigSensors& sensors) {
   const TomlSection section(table, "sensors", file,
-                            {"force_noise", "pressure_noise", "angle_noise", "torque_noise"});
+                            {"force_noise", "pressure_noise", "angle_noise", "torque_noise", "force_lag"});
   read_into(section, "force_noise", dimension::kForce, Sign::kNotNegative, sensors.force_noise);
   read_into(section, "pressure_noise", dimension::kPressure, Sign::kNotNegative, sensors.pressure_noise);
   read_into(section, "angle_noise", dimension::kAngle, Sign::kNotNegative, sensors.angle_noise);
   read_into(section, "torque_noise", dimension::kTorque, Sign::kNotNegative, sensors.torque_noise);
+  read_into(section, "force_lag", {.time = 1}, Sign::kNotNegative, sensors.force_lag);
 }
 
 void read_limits(const toml::table& table, const std::string& file, RigLimits& limits) {
@@ -226,6 +227,7 @@ std::string format_rig(const Rig& rig) {
   sensors.quantity("pressure_noise", rig.sensors.pressure_noise, "Pa");
   sensors.quantity("angle_noise", rig.sensors.angle_noise, "rad");
   sensors.quantity("torque_noise", rig.sensors.torque_noise, "N m");
+  sensors.quantity("force_lag", rig.sensors.force_lag, "s");
 
   Lines limits("[limits]");
   limits.quantity("delta_pressure", rig.limits.delta_pressure, "Pa");

@@ -34,6 +34,7 @@ struct RigSensors {                   // standard deviations
   double pressure_noise = kNotGiven;  ///< Pa
   double angle_noise = kNotGiven;     ///< rad, beyond the encoder's steps
   double torque_noise = kNotGiven;    ///< N m, for rigs that measure torque itself
+  double force_lag = kNotGiven;       ///< s, time constant of the force amplifiers
 };
 
 struct RigLimits {                        // safety limits, seed 3.5 and 6.3
