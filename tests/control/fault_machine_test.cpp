@@ -102,6 +102,13 @@ TEST(FaultMachine, starts_disarmed_and_a_switch_held_from_the_start_is_no_edge) 
   EXPECT_EQ(d.arm(), RunState::kArmed);
 }
 
+TEST(FaultMachine, a_switch_held_from_the_start_is_no_edge_even_without_a_plausibility_time) {
+  FaultMachine machine({.plausible_ticks = 0});
+  EXPECT_EQ(machine.begin({.now = 1, .sampled = 1, .arm = true}), RunState::kDisarmed);
+  EXPECT_EQ(machine.begin({.now = 500'001, .sampled = 500'001, .arm = false}), RunState::kDisarmed);
+  EXPECT_EQ(machine.begin({.now = 1'000'001, .sampled = 1'000'001, .arm = true}), RunState::kArmed);
+}
+
 TEST(FaultMachine, arms_only_after_enough_good_samples_in_a_row_and_an_early_edge_is_spent) {
   Driver d;
   d.tick();

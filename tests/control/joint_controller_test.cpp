@@ -215,6 +215,19 @@ TEST(JointController, no_change_of_structure_or_gains_is_felt) {
   }
 }
 
+TEST(JointController, a_cascade_takes_over_the_torque_that_a_pid_was_giving) {
+  JointSettings<double> s = testbed();
+  s.structure = Structure::kPid;
+  s.position = {.proportional = 0.2 * kKg, .integral = 4 * kKg};
+  Loop loop(s);
+  loop.plant.external = -1.5;
+  loop.wanted.angle = 0.2;
+  loop.run(12000);
+  ASSERT_EQ(loop.controller.configure(testbed()), Status::kOk);
+  loop.run(1);
+  EXPECT_NEAR(loop.u.wanted_torque, 1.5, 0.01);  // at rest the pair gives what the load takes
+}
+
 TEST(JointController, hold_keeps_the_angle_at_which_it_was_entered) {
   Loop loop(testbed());
   loop.wanted.angle = 0.25;

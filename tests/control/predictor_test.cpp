@@ -125,6 +125,16 @@ TEST(Predictor, corrects_by_exactly_nothing_without_dead_time_and_at_rest) {
   }
 }
 
+TEST(Predictor, its_model_comes_to_rest_where_pressure_spring_and_load_balance) {
+  const auto muscle = isac::models::testbed_parameters<double>();
+  JointPredictor<double> predictor({muscle, 0.019, 0.0085, {}});
+  predictor.reset(0.0, 0.0);
+  double correction = 0;
+  for (int k = 0; k < 8000; ++k) ASSERT_EQ(predictor.step(5e4, -0.7, kDt, correction), Status::kOk);
+  const double stiffness = 23450 * 0.019 * 0.019;
+  EXPECT_NEAR(predictor.angle(), (muscle.B * 0.019 * 5e4 - 0.7) / stiffness, 1e-6);  // e^(−4 s/0.17 s)
+}
+
 TEST(Predictor, refuses_bad_numbers) {
   JointPredictor<double> predictor({isac::models::testbed_parameters<double>(), 0.019, 0.0085, {}});
   double correction = 7;

@@ -201,7 +201,8 @@ TEST(CascadeStability, determinants_of_the_printed_entries) {
   EXPECT_NEAR(h[1], 0.0040, 5e-5);
   EXPECT_NEAR(h[2], 0.030, 1e-3);
   EXPECT_NEAR(h[4], 200 * h[3], 1e-9 * std::abs(h[4]));
-  EXPECT_GT(h[3], 0);  // printed 5.4 and 1100
+  EXPECT_NEAR(h[3], 1.84, 0.005);  // printed 5.4, and H5 1100: neither follows from the printed entries
+  EXPECT_NEAR(h[4], 367.6, 0.5);
   // As printed, row 4 with 0.015: the determinant of the first four rows is another number, and negative.
   const double m[4][4] = {
       {0.011, 9.5, 200, 0}, {0.0015, 1.7, 100, 0}, {0, 0.011, 9.5, 200}, {0, 0.015, 1.66, 100}};
@@ -222,6 +223,19 @@ TEST(CascadeStability, all_gains_of_the_testbed_are_stable_and_more_inertia_keep
     EXPECT_LT(largest_real_part(as_it_runs), 0);
     const auto measured = cascade_polynomial(l);
     EXPECT_EQ(is_hurwitz(measured), largest_real_part(measured) < 0);
+  }
+}
+
+TEST(CascadeStability, four_times_the_inertia_increases_every_determinant_as_the_seed_says) {
+  for (const bool as_it_runs : {false, true}) {
+    CascadeLoop<double> l = testbed_loop();
+    l.muscle.D = 0;
+    const auto minors = [&](double inertia) {
+      l.inertia = inertia;
+      return hurwitz_minors(as_it_runs ? model_based_polynomial(l) : cascade_polynomial(l));
+    };
+    const auto light = minors(0.0085), heavy = minors(0.036);
+    for (std::size_t i = 0; i < 5; ++i) EXPECT_GT(heavy[i], light[i]);
   }
 }
 

@@ -10,7 +10,7 @@ namespace isac::control {
 /// True when every argument is finite.
 template <class... S>
 [[nodiscard]] constexpr bool finite(const S&... values) noexcept {
-  return ((values - values == S(0.0)) && ...);
+  return ((values - values == S(0.0)) && ...);  // NOLINT(misc-redundant-expression): NaN - NaN is not 0
 }
 
 }  // namespace isac::control
