@@ -1,4 +1,4 @@
-// isac-log: records sweeps on a rig, with prompts, safety limits and a verdict after each (docs/how-to/log-a-sweep.md).
+// isac-log: records sweeps on a rig, with prompts, safety limits and a verdict after each (docs/how-to/log-a-sweep.md, calibrate.md).
 #include <fmt/format.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -28,7 +28,7 @@ using namespace isac;
 struct Words {
   std::string experiment, card, rig, folder, json, pace = "virtual";
   std::string duration, hold, amplitude, speed, base;
-  std::string delta_pressures, angles, heights;
+  std::string delta_pressures, angles, heights, weights, supplies;
   std::string limit_pressure, limit_delta_pressure, limit_angle, limit_speed, limit_force;
   double rate = 500;
   std::uint64_t seed = 1;
@@ -84,9 +84,10 @@ runtime::SessionOptions session_of(const Words& words, const Given& given) {
   }
   const bool rig_rate = !given.rate && std::isfinite(rig.card.sample_rate);
   session.rate = rig_rate ? rig.card.sample_rate : words.rate;
-  session.dataset = words.experiment == "all" || words.experiment == "testbed-bundle";
+  session.dataset =
+      words.experiment == "all" || words.experiment == "testbed-bundle" || words.experiment == "calibrate";
   session.pace_real = words.pace == "real";
-  session.raw = words.raw;
+  session.raw = words.raw || words.experiment == "calibrate";  // which is about nothing but counts
   session.overwrite = words.overwrite;
   session.seed = words.seed;
 
@@ -115,6 +116,9 @@ runtime::SessionOptions session_of(const Words& words, const Given& given) {
   excitation.base_pressure = parse_or(words.base, excitation.base_pressure, dimension::kPressure, "--base");
   excitation.delta_pressures = parse_list(words.delta_pressures, dimension::kPressure, "--delta-pressure");
   excitation.angles = parse_list(words.angles, dimension::kAngle, "--angle");
+  excitation.weights = parse_list(words.weights, dimension::kForce, "--weight");
+  excitation.supplies = parse_list(words.supplies, dimension::kPressure, "--supply");
+  excitation.force_limit = session.limits.force;
   excitation.heights = parse_list(words.heights, dimension::kPressure, "--heights");
   excitation.slow = words.slow || !words.fast;
   excitation.fast = words.fast || !words.slow;
@@ -260,6 +264,12 @@ int main(int argc, char** argv) {
   app.add_option("--angle", words.angles, "Clamps or poses, e.g. \"-10,0,10 deg\"")->group("Excitation");
   app.add_option("--heights", words.heights, "Of valve steps, e.g. \"2,3,4 kg/cm2\"")->group("Excitation");
   app.add_option("--base", words.base, "Pressure from which valve steps start, e.g. \"1 kg/cm2\"")
+      ->group("Excitation");
+  app.add_option("--weight", words.weights, "calibrate: on each force sensor (default: \"149.1 N\")")
+      ->group("Excitation");
+  app.add_option(
+         "--supply", words.supplies,
+         "calibrate: levels of the supply (default: 0 to the pressure limit, e.g. \"0,2.5,5 kg/cm2\")")
       ->group("Excitation");
   app.add_option("--hold", words.hold, "Of each valve step or pose, e.g. \"2 s\"")->group("Excitation");
 

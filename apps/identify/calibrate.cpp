@@ -29,6 +29,8 @@
 namespace isac::apps {
 namespace {
 
+constexpr const char* kSensors[] = {"p1", "p2"};
+
 struct Call {
   std::vector<std::string> files, levels, maps;
   std::string rig, output, report;
@@ -50,29 +52,33 @@ Level parse_level(const std::string& text, const std::string& file, const Error&
   return {trim(text.substr(0, equals)), trim(text.substr(equals + 1)), file};
 }
 
-std::vector<Level> levels_of(const Call& call, const std::map<std::string, series::Recording>& recordings) {
-  std::vector<Level> levels;
-  for (const std::string& text : call.levels) {
-    const auto colon = text.rfind(':');
-    const Error wrong(ErrorKind::kUsage, "level",
-                      "--level '" + text + "' must be SIGNAL=REFERENCE:FILE, e.g. \"F1=149.1 N:weight.csv\"");
-    if (colon == std::string::npos || colon + 1 >= text.size()) throw wrong;
-    levels.push_back(parse_level(text.substr(0, colon), text.substr(colon + 1), wrong));
+/// What the metadata line of a recording says, e.g. "p1 = 5 kg/cm2, p2 = 5 kg/cm2".
+void add_levels_of_file(const series::Recording& recording, const std::string& file, bool named,
+                        std::vector<Level>& levels) {
+  const std::string text = recording.meta("calibration");
+  const std::string experiment = recording.meta("experiment");
+  if (text.empty() && !named && !experiment.empty() && experiment != "calibration")
+    return;  // a sweep beside them
+  const Error wrong(
+      ErrorKind::kBadInput, "calibration_missing",
+      "does not say what it is a level of; add a line '# calibration: F1 = 149.1 N', or use --level",
+      {file, 0, 0});
+  for (std::size_t at = 0; at <= text.size();) {  // several, comma-separated: both sensors on one supply
+    const auto comma = std::min(text.find(',', at), text.size());
+    levels.push_back(parse_level(text.substr(at, comma - at), file, wrong));
+    at = comma + 1;
   }
-  for (const std::string& file : call.files) {
-    const std::string text = recordings.at(file).meta("calibration");
-    const Error wrong(
-        ErrorKind::kBadInput, "calibration_missing",
-        "does not say what it is a level of; add a line '# calibration: F1 = 149.1 N', or use --level",
-        {file, 0, 0});
-    for (std::size_t at = 0; at <= text.size();) {  // several, comma-separated: both sensors on one supply
-      const auto comma = std::min(text.find(',', at), text.size());
-      levels.push_back(parse_level(text.substr(at, comma - at), file, wrong));
-      at = comma + 1;
-    }
-  }
-  return levels;
 }
+
+Level parse_level_option(const std::string& text) {
+  const auto colon = text.rfind(':');
+  const Error wrong(ErrorKind::kUsage, "level",
+                    "--level '" + text + "' must be SIGNAL=REFERENCE:FILE, e.g. \"F1=149.1 N:weight.csv\"");
+  if (colon == std::string::npos || colon + 1 >= text.size()) throw wrong;
+  return parse_level(text.substr(0, colon), text.substr(colon + 1), wrong);
+}
+
+using Recordings = std::map<std::string, series::Recording>;
 
 const record::RigChannel& channel_of(const std::vector<record::RigChannel>& channels,
                                      const std::string& signal) {
@@ -102,51 +108,170 @@ struct Found {
   std::vector<estimate::ChannelCalibration> channels;
   std::vector<estimate::ValveCalibration> valves;
   std::vector<estimate::MiddleCalibration> middles;
+  Warnings warnings;
 };
 
-void calibrate_one(const std::string& signal, const std::vector<Level>& levels,
-                   const std::map<std::string, series::Recording>& recordings, record::Rig& rig,
-                   Found& found) {
-  const bool is_valve = signal == "p1_cmd" || signal == "p2_cmd";
-  record::RigChannel channel = channel_of(rig.calibration, signal);
-  if (signal == "angle") {
-    std::vector<estimate::MiddleApproach> approaches;
-    for (const Level& level : levels) {
-      approaches.push_back(
-          {.counts = recordings.at(level.file).column(channel.channel).values, .from_side = 0});
+const estimate::ChannelCalibration* find_sensor(const Found& found, const std::string& signal) {
+  for (const auto& channel : found.channels)
+    if (channel.name == signal) return &channel;
+  return nullptr;
+}
+
+/// A pressure by the calibration of this call where the recording has the counts, else as it was logged.
+std::vector<double> pressures_of(const series::Recording& recording, const std::string& signal,
+                                 const record::Rig& rig, Found& found) {
+  const record::RigChannel& channel = channel_of(rig.calibration, signal);
+  const series::Column* raw = recording.find(channel.channel);
+  if (raw == nullptr) {
+    const std::vector<double>& logged = recording.column(signal).values;
+    if (find_sensor(found, signal) != nullptr) {
+      found.warnings.push_back(
+          {"old_calibration",
+           recording.source + ": has no counts '" + channel.channel + "', so " + signal +
+               " is taken as it was logged, by the old calibration; record it with --raw"});
     }
-    found.middles.push_back(estimate::calibrate_middle(approaches, signal));
-    const double middle = found.middles.back().middle.value;
-    rig.encoder.middle_count = static_cast<int>(std::lround(middle));
-    channel.offset = middle;
-    set_channel(rig, channel);
-    return;
+    return logged;
   }
-  const Dimension dimension = signal[0] == 'F' ? dimension::kForce : dimension::kPressure;
+  std::vector<double> pressures;
+  pressures.reserve(raw->values.size());
+  for (const double count : raw->values) pressures.push_back((count - channel.offset) * channel.gain);
+  return pressures;
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0, count = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    sum += value;
+    count += 1;
+  }
+  return sum / count;
+}
+
+/// "middle", "middle +", "middle -": the side that the joint came from.
+int side_of(const Level& level) {
+  if (level.value == "middle") return 0;
+  if (level.value == "middle +") return 1;
+  if (level.value == "middle -") return -1;
+  throw Error(ErrorKind::kBadInput, "middle_side",
+              "'angle = " + level.value + "' must be 'angle = middle', 'middle +' or 'middle -'",
+              {level.file, 0, 0});
+}
+
+void calibrate_encoder(const std::vector<Level>& levels, const Recordings& recordings, record::Rig& rig,
+                       Found& found) {
+  constexpr double kModulus = 16777216;  // counters of 24 bits (card.hpp) wrap beside a middle at 0
+  record::RigChannel channel = channel_of(rig.calibration, "angle");
+  std::vector<estimate::MiddleApproach> approaches;
+  for (const Level& level : levels) {
+    const series::Recording& recording = recordings.at(level.file);
+    estimate::MiddleApproach approach;
+    approach.from_side = side_of(level);
+    for (const double count : recording.column(channel.channel).values)
+      approach.counts.push_back(count > kModulus / 2 ? count - kModulus : count);
+    const bool pressures = std::all_of(std::begin(kSensors), std::end(kSensors), [&](const char* signal) {
+      return recording.find(signal) != nullptr ||
+             recording.find(channel_of(rig.calibration, signal).channel) != nullptr;
+    });
+    if (pressures) {
+      approach.delta_pressure = 0.5 * (mean_of(pressures_of(recording, "p2", rig, found)) -
+                                       mean_of(pressures_of(recording, "p1", rig, found)));
+    }
+    approaches.push_back(std::move(approach));
+  }
+  found.middles.push_back(estimate::calibrate_middle(approaches, "angle"));
+  const double middle = found.middles.back().middle.value;
+  rig.encoder.middle_count = static_cast<int>(std::lround(middle));
+  channel.offset = middle;
+  set_channel(rig, channel);
+}
+
+void calibrate_sensor(const std::string& signal, const std::vector<Level>& levels,
+                      const Recordings& recordings, record::Rig& rig, Found& found) {
+  record::RigChannel channel = channel_of(rig.calibration, signal);
+  const bool force = signal[0] == 'F';
   std::vector<estimate::CalibrationLevel> readings;
   for (const Level& level : levels) {
     const series::Recording& recording = recordings.at(level.file);
     estimate::CalibrationLevel reading;
-    reading.reference = is_valve ? parse_quantity(level.value + " count", dimension::kCount, signal)
-                                 : parse_quantity(level.value, dimension, signal);
+    reading.reference = parse_quantity(level.value, force ? dimension::kForce : dimension::kPressure, signal);
     reading.time = recording.column("time").values;
-    reading.reading = recording.column(is_valve ? signal.substr(0, 2) : channel.channel).values;
+    reading.reading = recording.column(channel.channel).values;
     readings.push_back(std::move(reading));
   }
-  if (is_valve) {
-    found.valves.push_back(estimate::calibrate_valve(readings, estimate::valve_calibration_options(signal)));
-    const auto& line = found.valves.back().line;  // pressure = offset + gain · code
-    channel.gain = line.gain.value;
-    channel.offset = -line.offset.value / line.gain.value;
-  } else {
-    estimate::CalibrationOptions options;
-    options.name = signal;
-    options.reference_unit = signal[0] == 'F' ? "N" : "Pa";
-    found.channels.push_back(estimate::calibrate_sensor(readings, options));
-    channel.offset = found.channels.back().offset.value;
-    channel.gain = found.channels.back().sensitivity.value;
-  }
+  estimate::CalibrationOptions options;
+  options.name = signal;
+  options.reference_unit = force ? "N" : "Pa";
+  found.channels.push_back(estimate::calibrate_sensor(readings, options));
+  channel.offset = found.channels.back().offset.value;
+  channel.gain = found.channels.back().sensitivity.value;
   set_channel(rig, channel);
+}
+
+/// The error that the sensor's own calibration brings into a pressure read with it.
+void widen(Estimated& pressure, const estimate::ChannelCalibration* sensor) {
+  if (sensor == nullptr || !(pressure.std_error > 0)) return;
+  const double reading = sensor->offset.value + sensor->gain.value * pressure.value;
+  const double error = std::hypot(pressure.std_error, sensor->reference_error(reading));
+  const double factor = error / pressure.std_error;
+  pressure.ci_low = pressure.value - factor * (pressure.value - pressure.ci_low);
+  pressure.ci_high = pressure.value + factor * (pressure.ci_high - pressure.value);
+  pressure.std_error = error;
+}
+
+void calibrate_valve(const std::string& signal, const std::vector<Level>& levels,
+                     const Recordings& recordings, record::Rig& rig, Found& found) {
+  record::RigChannel channel = channel_of(rig.calibration, signal);
+  const std::string sensor = signal.substr(0, 2);
+  std::vector<estimate::CalibrationLevel> open, vented;
+  for (const Level& level : levels) {
+    const series::Recording& recording = recordings.at(level.file);
+    estimate::CalibrationLevel reading;
+    reading.reference = parse_quantity(level.value + " count", dimension::kCount, signal);
+    reading.time = recording.column("time").values;
+    reading.reading = pressures_of(recording, sensor, rig, found);
+    (reading.reference > 0 ? open : vented).push_back(std::move(reading));
+  }
+  // No valve pulls below zero: code 0 bends the line wherever the zero trimmer stands below it.
+  const bool apart = open.size() >= 2 && !vented.empty();
+  if (!apart) open.insert(open.end(), vented.begin(), vented.end());
+  found.valves.push_back(estimate::calibrate_valve(open, estimate::valve_calibration_options(signal)));
+  estimate::ValveCalibration& valve = found.valves.back();
+  if (apart) {
+    // Rounded to what is shown, plus 0: no "-0.000".
+    const double at_zero = std::round(mean_of(vented.front().reading) / kPascalPerKgfCm2 * 1e3) / 1e3 + 0.0;
+    valve.line.sentence += fmt::format("; vented at code 0 it shows {:.3f} kg/cm2, the line {:.3f} kg/cm2",
+                                       at_zero, valve.line.offset.value / kPascalPerKgfCm2);
+  }
+  const auto& line = valve.line;  // pressure = offset + gain · code
+  channel.gain = line.gain.value;
+  channel.offset = -line.offset.value / line.gain.value;
+  for (Estimated* pressure : {&valve.cal_pressure, &valve.zero_pressure})
+    widen(*pressure, find_sensor(found, sensor));
+  set_channel(rig, channel);
+}
+
+/// Sensors first: valves and the middle are read by them.
+int turn_of(const std::string& signal) {
+  return signal.find("_cmd") != std::string::npos || signal == "angle" ? 1 : 0;
+}
+
+Found calibrate_all(const std::map<std::string, std::vector<Level>>& by_signal, const Recordings& recordings,
+                    record::Rig& rig) {
+  Found found;
+  for (const int turn : {0, 1}) {
+    for (const auto& [signal, levels] : by_signal) {
+      if (turn_of(signal) != turn) continue;
+      if (signal == "angle") {
+        calibrate_encoder(levels, recordings, rig, found);
+      } else if (signal == "p1_cmd" || signal == "p2_cmd") {
+        calibrate_valve(signal, levels, recordings, rig, found);
+      } else {
+        calibrate_sensor(signal, levels, recordings, rig, found);
+      }
+    }
+  }
+  return found;
 }
 
 Estimated renamed(Estimated value, const std::string& signal, const std::string& what) {
@@ -154,28 +279,42 @@ Estimated renamed(Estimated value, const std::string& signal, const std::string&
   return value;
 }
 
+/// Terminal: pressures in the unit that people at the rig speak.
+Estimated in_kgf(Estimated value) {
+  double factor = 1;
+  if (value.unit == "Pa") factor = 1 / kPascalPerKgfCm2, value.unit = "kg/cm2";
+  if (value.unit == "count/Pa") factor = kPascalPerKgfCm2, value.unit = "count per kg/cm2";
+  for (double* part : {&value.value, &value.std_error, &value.ci_low, &value.ci_high}) *part *= factor;
+  return value;
+}
+
 int run_calibrate(const Call& call, const std::string& json_path) {
   for (const std::string& path : {call.output, call.report, json_path}) require_writable(path);
+  const Files files = find_files(call.files, {}, call.rig);
   record::Rig rig;
-  if (!call.rig.empty()) rig = record::read_rig(call.rig);
+  if (!files.rig.empty()) rig = record::read_rig(files.rig);
   if (rig.calibration.empty()) rig.calibration = card::default_calibration();
 
   const record::ReadOptions reading{.map = parse_maps(call.maps), .require_time = true, .hash = false};
-  std::map<std::string, series::Recording> recordings;
-  for (const std::string& file : call.files) recordings.emplace(file, record::read_recording(file, reading));
-  const auto levels = levels_of(call, recordings);
-  std::map<std::string, std::vector<Level>> by_signal;
+  Recordings recordings;
+  std::vector<Level> levels;
+  for (const std::string& text : call.levels) levels.push_back(parse_level_option(text));
   for (const Level& level : levels) {
-    if (recordings.find(level.file) == recordings.end()) {
+    if (recordings.find(level.file) == recordings.end())
       recordings.emplace(level.file, record::read_recording(level.file, reading));
-    }
-    by_signal[level.signal].push_back(level);
   }
+  for (const auto& path : files.runs) {
+    const std::string file = path.string();
+    const bool named = std::find(call.files.begin(), call.files.end(), file) != call.files.end();
+    if (recordings.find(file) == recordings.end())
+      recordings.emplace(file, record::read_recording(file, reading));
+    add_levels_of_file(recordings.at(file), file, named, levels);
+  }
+  std::map<std::string, std::vector<Level>> by_signal;
+  for (const Level& level : levels) by_signal[level.signal].push_back(level);
   if (by_signal.empty())
     throw Error(ErrorKind::kUsage, "no_levels", "names no levels; give recordings or --level");
-  Found found;
-  // Sensors before valves: a valve is calibrated with the pressures its sensor shows.
-  for (const auto& [signal, of_signal] : by_signal) calibrate_one(signal, of_signal, recordings, rig, found);
+  const Found found = calibrate_all(by_signal, recordings, rig);
 
   record::Answer answer;
   answer.schema = "isac.calibration/1";
@@ -195,8 +334,10 @@ int run_calibrate(const Call& call, const std::string& json_path) {
   }
   for (const auto& middle : found.middles) {
     answer.parameters.push_back(renamed(middle.middle, "angle", "middle"));
+    answer.parameters.push_back(renamed(middle.side_difference, "angle", "side_difference"));
     answer.warnings.insert(answer.warnings.end(), middle.warnings.begin(), middle.warnings.end());
   }
+  answer.warnings.insert(answer.warnings.end(), found.warnings.begin(), found.warnings.end());
   if (!call.report.empty()) {
     report::CalibrationReportInput input;
     input.head.created = now_iso8601();
@@ -204,14 +345,25 @@ int run_calibrate(const Call& call, const std::string& json_path) {
     input.channels = found.channels;
     for (const auto& valve : found.valves) input.channels.push_back(valve.line);
     input.middles = found.middles;
+    for (const auto& channel : found.channels) {
+      if (channel.linearity != estimate::Linearity::kNotTestable) continue;
+      input.next_steps.push_back(channel.name +
+                                 ": record a third level between the two, which tells whether it is a line.");
+    }
+    input.next_steps.push_back(
+        call.output.empty() ? "Write the new calibration into a rig file with -o before the next recording."
+                            : "Record from now on with --rig " + call.output + ".");
     record::write_atomically(call.report, report::render_calibration_report(input));
   }
   if (!call.output.empty()) record::write_atomically(call.output, record::format_rig(rig), true);
   if (!json_path.empty()) write_text(json_path, record::format_answer(answer, extra));
   if (json_path != "-") {
-    print_parameters(answer.parameters);
+    std::vector<Estimated> shown;
+    for (const Estimated& parameter : answer.parameters) shown.push_back(in_kgf(parameter));
+    print_parameters(shown);
     for (const auto& sentence : extra["sentences"]) fmt::print("· {}\n", sentence.get<std::string>());
     print_warnings(answer.warnings);
+    if (!call.output.empty()) fmt::print("the rig with this calibration is in {}\n", call.output);
   }
   return 0;
 }
@@ -223,10 +375,12 @@ Body add_calibrate(CLI::App& program, std::string& json_path) {
   CLI::App* sub =
       program.add_subcommand("calibrate", "offsets and gains of sensors and valves, encoder middle");
   sub->add_option("files", call->files,
-                  "recordings of raw counts, each with a line '# calibration: F1 = 149.1 N'");
+                  "folders of isac-log calibrate, or recordings of raw counts, each with a line "
+                  "'# calibration: F1 = 149.1 N'");
   sub->add_option("--level", call->levels,
                   "SIGNAL=REFERENCE:FILE, e.g. \"p1=5 kg/cm2:full.csv\", \"angle=middle:stiff.csv\"");
-  sub->add_option("--rig", call->rig, "rig.toml with the present wiring and calibration");
+  sub->add_option("--rig", call->rig,
+                  "rig.toml with the present wiring and calibration (default: the folder's)");
   sub->add_option("--map", call->maps, "foreign column, e.g. ai0=\"Channel 0\":count");
   sub->add_option("-o,--output", call->output,
                   "rig.toml to write with the new calibration (the old one is kept as .bak)");

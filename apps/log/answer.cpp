@@ -24,18 +24,28 @@ Json format_one(const RecordingOutcome& outcome) {
   for (const series::SweepRemark& remark : outcome.verdict.remarks) {
     remarks.push_back({{"code", remark.code}, {"text", remark.text}, {"repeat", remark.repeat}});
   }
-  return {{"file", outcome.file.string()},
-          {"verdict", outcome.verdict.keep() ? "keep" : "repeat"},
-          {"samples", facts.rows},
-          {"dropped", outcome.dropped},
-          {"late", outcome.loop.late},
-          {"facts",
-           {{"duration", {{"value", number_or_null(facts.duration)}, {"unit", "s"}}},
-            {"angle", range_or_null(facts.angle_low, facts.angle_high, "rad")},
-            {"speed", range_or_null(-facts.speed_backward, facts.speed_forward, "rad/s")},
-            {"delta_pressure", range_or_null(facts.delta_pressure_low, facts.delta_pressure_high, "Pa")},
-            {"force", range_or_null(facts.force_low, facts.force_high, "N")}}},
-          {"remarks", std::move(remarks)}};
+  Json levels = Json::array();
+  for (const series::SweepFacts::Level& level : facts.levels) {
+    const char* unit = level.column[0] == 'F' ? "N" : level.column[0] == 'p' ? "Pa" : "rad";
+    levels.push_back({{"signal", level.column},
+                      {"mean", number_or_null(level.mean)},
+                      {"scatter", number_or_null(level.scatter)},
+                      {"unit", unit}});
+  }
+  Json one = {{"file", outcome.file.string()},
+              {"verdict", outcome.verdict.keep() ? "keep" : "repeat"},
+              {"samples", facts.rows},
+              {"dropped", outcome.dropped},
+              {"late", outcome.loop.late},
+              {"facts",
+               {{"duration", {{"value", number_or_null(facts.duration)}, {"unit", "s"}}},
+                {"angle", range_or_null(facts.angle_low, facts.angle_high, "rad")},
+                {"speed", range_or_null(-facts.speed_backward, facts.speed_forward, "rad/s")},
+                {"delta_pressure", range_or_null(facts.delta_pressure_low, facts.delta_pressure_high, "Pa")},
+                {"force", range_or_null(facts.force_low, facts.force_high, "N")}}},
+              {"remarks", std::move(remarks)}};
+  if (!facts.levels.empty()) one["facts"]["levels"] = std::move(levels);
+  return one;
 }
 
 }  // namespace

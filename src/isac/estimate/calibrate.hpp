@@ -5,6 +5,7 @@
 ///   reading = offset + gain · reference          sensors: e.g. counts at 0 and 5 kg/cm², at 0 and 149.1 N
 ///   pressure = offset + gain · code              valves: codes 0 … 4095; CalPressure is the pressure at 4095
 ///   middle  = mean of the encoder's rest positions over repeated approaches with both muscles stiff
+///   rest    = middle + shift · Δp ± half the sides' difference, where approaches at several Δp were recorded
 ///
 /// Any number of levels ≥ 2: weighted least squares, weights from the scatter of 50 ms averages at each level
 /// (seed E.2), so that noise correlated over less than 50 ms does not make the errors too small. With ≥ 3
@@ -101,12 +102,15 @@ struct MiddleApproach {
   std::vector<double> counts;
   int from_side =
       0;  ///< +1, −1: the side the joint came from, 0 unknown; play or hysteresis shows as a difference
+  double delta_pressure = std::numeric_limits<double>::quiet_NaN();  ///< Pa, measured while it rests
 };
 
 struct MiddleCalibration {
   Estimated middle;  ///< EncMiddlePosition, count; standard error from the scatter between approaches
   Estimated side_difference;  ///< count, positive side less negative side; refused when one side is missing
-  std::vector<double> approaches;  ///< mean of each, count
+  /// count/Pa, of the rest position with Δp; refused without four approaches over 0.05 kg/cm²
+  Estimated shift{};
+  std::vector<double> approaches;  ///< mean of each less shift · Δp, count
   Warnings warnings;
 };
 

@@ -12,8 +12,8 @@ namespace isac::record {
 namespace {
 
 constexpr std::size_t kMostBytes = std::size_t{1} << 20U;
-constexpr std::string_view kExperiments[] = {"constant-pressure", "constant-angle", "free",
-                                             "pcu-step",          "pose",           "closed-loop"};
+constexpr std::string_view kExperiments[] = {
+    "constant-pressure", "constant-angle", "free", "pcu-step", "pose", "closed-loop", "calibration"};
 
 // Lower case, with '_' and ' ' as '-': what people type when they mean one of the list.
 std::string normalised(std::string_view text) {
@@ -151,10 +151,11 @@ void Metadata::add_line(std::string_view line, const Place& place) {
   }
   if (key == "experiment") {
     if (const std::string_view meant = misspelt(value); !meant.empty()) {
-      throw Error(ErrorKind::kBadInput, "experiment_misspelt",
-                  "experiment " + shown(value) + " is not known; write " + std::string(meant) +
-                      " (known: constant-pressure, constant-angle, free, pcu-step, pose, closed-loop)",
-                  {place.file, place.line, value_column});
+      throw Error(
+          ErrorKind::kBadInput, "experiment_misspelt",
+          "experiment " + shown(value) + " is not known; write " + std::string(meant) +
+              " (known: constant-pressure, constant-angle, free, pcu-step, pose, closed-loop, calibration)",
+          {place.file, place.line, value_column});
     }
   }
   auto [entry, fresh] = values_.try_emplace(std::string(key), value);

@@ -31,7 +31,18 @@ card::Task to_task(const series::Ask& ask) noexcept {
     case series::Ask::Kind::kPose:
       task.kind = card::Task::Kind::kPose;
       break;
+    case series::Ask::Kind::kRemoveLoad:
+      task.kind = card::Task::Kind::kRemoveLoad;
+      break;
+    case series::Ask::Kind::kHangWeight:
+      task.kind = card::Task::Kind::kHangWeight;
+      break;
+    case series::Ask::Kind::kConnectSupply:
+      task.kind = card::Task::Kind::kConnectSupply;
+      break;
   }
+  task.load_newton = ask.load;
+  task.pressure_pascal = ask.pressure;
   task.amplitude_rad = ask.amplitude;
   task.speed_rad_s = ask.speed;
   task.vary_speed = ask.vary_speed;
@@ -96,7 +107,8 @@ bool ExperimentLoop::tick(Tick& tick) noexcept {
 }
 
 bool ExperimentLoop::write(const series::Pressures& pressures, LogRow* row) noexcept {
-  const card::Command command = map_.to_command(pressures);
+  const card::Command command =
+      program_.in_codes ? map_.to_command_of_codes(pressures) : map_.to_command(pressures);
   result_.status = rig_.card->write(command);
   if (!ok(result_.status)) return end(LoopResult::End::kCard);
   if (row != nullptr) {
@@ -121,7 +133,7 @@ void ExperimentLoop::ask_person(const series::Ask& ask) noexcept {
 }
 
 bool ExperimentLoop::ramp_pressures() noexcept {
-  const series::Pressures target = program_.at(0.0);
+  const series::Pressures target = program_.lead.empty() ? program_.at(0.0) : program_.lead_at(0.0);
   const auto ticks = static_cast<int>(std::ceil(kRampSeconds * options_.rate));
   Tick now;
   for (int i = 1; i <= ticks; ++i) {
@@ -131,6 +143,17 @@ bool ExperimentLoop::ramp_pressures() noexcept {
     next_ns_ += period_ns_;
   }
   return true;
+}
+
+bool ExperimentLoop::play_lead() noexcept {
+  if (program_.lead.empty()) return true;
+  const double ticks = program_.lead.back().time * options_.rate;
+  Tick now;
+  for (double i = 1.0; i <= ticks; i += 1.0) {
+    if (!tick(now) || !write(program_.lead_at(i / options_.rate), nullptr)) return false;
+    next_ns_ += period_ns_;
+  }
+  return tick(now) && write(program_.at(0.0), nullptr);
 }
 
 bool ExperimentLoop::hold(double seconds) noexcept {
@@ -162,13 +185,14 @@ LoopResult ExperimentLoop::lead_in() noexcept {
   }
   // A clamp is closed before the pressures rise; a hand takes hold of a joint that has found its place.
   const series::Ask::Kind kind = program_.stages.front().ask.kind;
-  const bool ask_first = kind == series::Ask::Kind::kClamp || kind == series::Ask::Kind::kRelease;
-  if (ask_first) {
+  const bool ask_last = kind == series::Ask::Kind::kRest || kind == series::Ask::Kind::kSweepByHand ||
+                        kind == series::Ask::Kind::kPose;
+  if (!ask_last) {
     ask(0);
     if (!wait_until_ready()) return result_;
   }
-  if (!ramp_pressures() || !hold(kSettleSeconds)) return result_;
-  if (!ask_first) {
+  if (!ramp_pressures() || !play_lead() || !hold(kSettleSeconds)) return result_;
+  if (ask_last) {
     ask(0);
     if (!wait_until_ready() || !hold(0.2)) return result_;
   }

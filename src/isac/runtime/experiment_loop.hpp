@@ -1,7 +1,7 @@
 /// @file
 /// The periodic loop of a recording: wait, read, convert, check, command, hand to the writer.
 ///
-///   lead_in()  asks the person, brings the pressures up from vented, waits until the person has taken the task up
+///   lead_in()  asks the person, brings the pressures up from vented, plays the program's lead, waits until the person has taken the task up
 ///   record()   plays the program and pushes a row per sample into the writer's ring
 /// Time is the card's own; a loop that comes late skips whole periods (never a burst to catch up) and counts them.
 ///
@@ -76,6 +76,7 @@ class ExperimentLoop {
   bool tick(Tick& tick) noexcept;  ///< false: result_ says why the loop ends
   bool write(const series::Pressures& pressures, LogRow* row) noexcept;
   bool ramp_pressures() noexcept;
+  bool play_lead() noexcept;
   bool wait_until_ready() noexcept;
   bool hold(double seconds) noexcept;
   void ask(std::size_t stage) noexcept;  ///< and shows its prompt

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -21,6 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::system_clock;
+
+constexpr double kUncalibrated = 1.1;
 
 std::string iso_time(Clock::time_point time) {
   const auto since = time.time_since_epoch();
@@ -111,6 +114,7 @@ std::map<std::string, std::string> metadata_of(const SessionOptions& options, co
       {"program", "isac-log " ISAC_VERSION},
   };
   if (options.rig.name.empty()) metadata.erase("rig");
+  if (!program.calibration.empty()) metadata["calibration"] = program.calibration;
   if (!program.sweep.empty()) metadata["sweep"] = program.sweep;
   if (std::isfinite(program.expected.held_delta_pressure)) {
     metadata["delta_pressure"] =
@@ -170,6 +174,12 @@ class Session {
     loop.rate = options_.rate;
     loop.limits = options_.limits;
     if (program.hand_moves) loop.limits.speed = options_.hand_speed_limit;
+    if (!program.calibration.empty()) {
+      // Sensors that are about to be calibrated are believed to a tenth, an encoder without its middle not at all.
+      for (double* limit : {&loop.limits.pressure, &loop.limits.delta_pressure, &loop.limits.force})
+        *limit *= kUncalibrated;
+      loop.limits.angle = std::numeric_limits<double>::infinity();
+    }
     loop.pace_real = options_.pace_real;
     loop.virtual_time = virtual_ && !options_.pace_real;
     loop.lead_in = options_.card.rfind("replay:", 0) != 0;

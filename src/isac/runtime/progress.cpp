@@ -9,6 +9,21 @@
 
 namespace isac::runtime {
 
+namespace {
+
+/// "p1 2.503 kg/cm2 (scatter 0.004)"
+std::string level_words(const series::SweepFacts::Level& level) {
+  const bool force = level.column[0] == 'F', pressure = level.column[0] == 'p';
+  const double unit = pressure ? kPascalPerKgfCm2 : 1.0;
+  return fmt::format("{} {:.{}f} {} (scatter {:.{}f})", level.column, level.mean / unit, force ? 2 : 4,
+                     force      ? "N"
+                     : pressure ? "kg/cm2"
+                                : "rad",
+                     level.scatter / unit, force ? 2 : 4);
+}
+
+}  // namespace
+
 std::string progress_line(const series::Program& program, const Live& live, int columns) {
   const double elapsed = live.elapsed.load(std::memory_order_relaxed);
   if (!live.recording.load(std::memory_order_relaxed) && live.rows.load(std::memory_order_relaxed) == 0) {
@@ -57,13 +72,17 @@ std::string verdict_lines(const RecordingOutcome& outcome, bool colour, int colu
   const series::SweepFacts& facts = outcome.verdict.facts;
   const char* on = !colour ? "" : keep ? "\033[1;32m" : "\033[1;31m";
   const char* off = colour ? "\033[0m" : "";
-  const std::string covered = fmt::format(
+  std::string covered = fmt::format(
       "          {} samples, angle {:+.2f} to {:+.2f} rad, speed {:+.2f} to {:+.2f} rad/s, dp {:+.2f} to "
       "{:+.2f} kg/cm2, "
       "F {:.0f} to {:.0f} N",
       facts.rows, facts.angle_low, facts.angle_high, -facts.speed_backward, facts.speed_forward,
       facts.delta_pressure_low / kPascalPerKgfCm2, facts.delta_pressure_high / kPascalPerKgfCm2,
       facts.force_low, facts.force_high);
+  if (!facts.levels.empty()) {
+    covered = fmt::format("          {} samples", facts.rows);
+    for (const auto& level : facts.levels) covered += ", " + level_words(level);
+  }
   std::string text = fmt::format("  {}{:<6}{}  {}\n{}\n", on, keep ? "keep" : "repeat", off,
                                  outcome.file.filename().string(), wrapped(covered, columns, 10));
   for (const series::SweepRemark& remark : outcome.verdict.remarks) {

@@ -108,16 +108,21 @@ Physical SignalMap::to_physical(const card::Sample& sample) noexcept {
           .F2 = input(F2_)};
 }
 
-std::uint32_t SignalMap::code(const Line& line, double pressure) const noexcept {
-  const double wanted = std::round(pressure / line.gain + line.offset);
+std::uint32_t SignalMap::clamped(double code) const noexcept {
+  const double wanted = std::round(code);
   if (!(wanted > 0.0)) return 0;  // NaN too
   return static_cast<std::uint32_t>(std::min(wanted, static_cast<double>(shape_.output_max_code)));
 }
 
 card::Command SignalMap::to_command(const series::Pressures& pressures) const noexcept {
+  return to_command_of_codes({.p1 = pressures.p1 / p1_cmd_.gain + p1_cmd_.offset,
+                              .p2 = pressures.p2 / p2_cmd_.gain + p2_cmd_.offset});
+}
+
+card::Command SignalMap::to_command_of_codes(const series::Pressures& codes) const noexcept {
   card::Command command;
-  command.output[static_cast<std::size_t>(p1_cmd_.channel)] = code(p1_cmd_, pressures.p1);
-  command.output[static_cast<std::size_t>(p2_cmd_.channel)] = code(p2_cmd_, pressures.p2);
+  command.output[static_cast<std::size_t>(p1_cmd_.channel)] = clamped(codes.p1);
+  command.output[static_cast<std::size_t>(p2_cmd_.channel)] = clamped(codes.p2);
   return command;
 }
 

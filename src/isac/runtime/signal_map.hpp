@@ -36,6 +36,8 @@ class SignalMap {
   [[nodiscard]] Physical to_physical(const card::Sample& sample) noexcept;
   /// Codes for both valves, rounded and clamped to the outputs' range; all other outputs 0. NaN gives 0: vented.
   [[nodiscard]] card::Command to_command(const series::Pressures& pressures) const noexcept;
+  /// Both valves' codes themselves, rounded and clamped likewise.
+  [[nodiscard]] card::Command to_command_of_codes(const series::Pressures& codes) const noexcept;
   /// The pressures that a command's codes stand for.
   [[nodiscard]] series::Pressures commanded(const card::Command& command) const noexcept;
 
@@ -52,7 +54,7 @@ class SignalMap {
   [[nodiscard]] static double value(const Line& line, std::uint32_t code) noexcept {
     return (static_cast<double>(code) - line.offset) * line.gain;
   }
-  [[nodiscard]] std::uint32_t code(const Line& line, double pressure) const noexcept;
+  [[nodiscard]] std::uint32_t clamped(double code) const noexcept;
 
   card::Shape shape_;
   Line p1_, p2_, F1_, F2_, p1_cmd_, p2_cmd_;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "isac/core/error.hpp"
+#include "isac/series/calibration_programs.hpp"
 
 namespace isac::series {
 namespace {
@@ -411,6 +412,8 @@ std::vector<Program> make_programs(std::string_view experiment, const Excitation
     programs.push_back(valve_steps(options));
   } else if (experiment == "pose") {
     programs.push_back(pose_holds(options));
+  } else if (experiment == "calibrate") {
+    programs = calibration_programs(options);
   } else if (experiment == "testbed-bundle" || experiment == "all") {
     programs = testbed_bundle(options);
   } else {

@@ -12,10 +12,13 @@
 /// Ranges by default are those the seed's force sensors (200 N) can show on its testbed: a hand's sweep of 0.3 of the angle
 /// limit either side of where the bar rests, and 0.45 of the Δp that limits leave room for on the clamped joint.
 ///
+/// `calibrate` (seed E.3, Calibration_x0) is a set of its own: one recording per level of a reference, see
+/// calibration_programs.hpp.
+///
 /// Units: SI. Real time: Program::at allocates nothing and throws nothing, O(log knots). Threads: values.
 /// Errors: make_programs throws isac::Error (usage) that names the number, the limit it breaks and the mend.
 /// Source: seed 3.2, 3.3 (slow 0.1π rad/s, fast to 2π rad/s, five-minute bundle), 3.4, 3.5 (ranges), 4.1
-/// (valve steps). Example: `for (const auto& program : make_programs("constant-pressure", options)) …`
+/// (valve steps), E.3 (calibration). Example: `for (const auto& program : make_programs("constant-pressure", options)) …`
 #pragma once
 
 #include <cstdint>
@@ -31,11 +34,22 @@ namespace isac::series {
 
 /// What the person does during a stage.
 struct Ask {
-  enum class Kind { kRest, kSweepByHand, kClamp, kRelease, kPose } kind = Kind::kRest;
+  enum class Kind {
+    kRest,
+    kSweepByHand,
+    kClamp,
+    kRelease,
+    kPose,
+    kRemoveLoad,    ///< force sensors off the rig, nothing acting on them
+    kHangWeight,    ///< `load` on a force sensor
+    kConnectSupply  ///< both pressure sensors on the supply at `pressure`
+  } kind = Kind::kRest;
   double amplitude = 0;     ///< rad, either side of where the bar rests
   double speed = 0;         ///< rad/s, peak
   bool vary_speed = false;  ///< all speeds up to `speed`
   double angle = 0;         ///< rad, where to clamp or hold
+  double load = 0;          ///< N
+  double pressure = 0;      ///< Pa
 };
 
 struct Stage {
@@ -45,7 +59,7 @@ struct Stage {
 };
 
 struct Knot {
-  double time = 0, p1 = 0, p2 = 0;  ///< s, Pa, Pa
+  double time = 0, p1 = 0, p2 = 0;  ///< s, Pa, Pa; codes of the valves where the program says so
 };
 
 struct Tone {
@@ -53,7 +67,7 @@ struct Tone {
 };
 
 struct Pressures {
-  double p1 = 0, p2 = 0;  ///< Pa
+  double p1 = 0, p2 = 0;  ///< Pa, or codes
 };
 
 /// One recording to be made.
@@ -66,11 +80,16 @@ struct Program {
   bool hand_moves = false;    ///< a person moves the joint, so the speed limit allows for a hand that wanders
   std::vector<Stage> stages;  ///< the first starts at 0
   std::vector<Knot> knots;    ///< at least one; times never decrease
+  std::vector<Knot> lead;     ///< played before the recording begins; empty: none
+  bool in_codes = false;      ///< knots and lead are valve codes: a valve is calibrated in what it is told
+  std::string calibration;    ///< `# calibration:`, what the recording is a level of; empty: none
   std::vector<Tone> tones;
   double tones_from = 0, tones_to = 0;
   SweepExpectation expected;
 
   [[nodiscard]] Pressures at(double time) const noexcept;
+  /// The same of `lead`, which must not be empty.
+  [[nodiscard]] Pressures lead_at(double time) const noexcept;
 };
 
 struct ExcitationOptions {
@@ -90,6 +109,9 @@ struct ExcitationOptions {
   std::vector<double> angles;                                   ///< rad; clamps or poses
   bool slow = true, fast = true;                                ///< which constant-pressure sweeps
   double base_pressure = 1.0 * kPascalPerKgfCm2;                ///< Pa, from which valve steps start
+  std::vector<double> weights;                                  ///< N, hung on each force sensor
+  std::vector<double> supplies;                                 ///< Pa, levels of the supply's regulator
+  double force_limit = 200.0;                                   ///< N, capacity of the force sensors
   std::uint64_t seed = 1;
 };
 

@@ -6,19 +6,26 @@
 
 namespace isac::series {
 
-Pressures Program::at(double time) const noexcept {
+namespace {
+
+Pressures along(const std::vector<Knot>& knots, double time) noexcept {
   const auto next = std::upper_bound(knots.begin(), knots.end(), time,
                                      [](double value, const Knot& knot) { return value < knot.time; });
-  Pressures out;
-  if (next == knots.begin()) {
-    out = {next->p1, next->p2};
-  } else if (next == knots.end()) {
-    out = {knots.back().p1, knots.back().p2};
-  } else {
-    const Knot& before = *(next - 1);
-    const double share = (time - before.time) / (next->time - before.time);
-    out = {before.p1 + share * (next->p1 - before.p1), before.p2 + share * (next->p2 - before.p2)};
-  }
+  if (next == knots.begin()) return {next->p1, next->p2};
+  if (next == knots.end()) return {knots.back().p1, knots.back().p2};
+  const Knot& before = *(next - 1);
+  const double share = (time - before.time) / (next->time - before.time);
+  return {before.p1 + share * (next->p1 - before.p1), before.p2 + share * (next->p2 - before.p2)};
+}
+
+}  // namespace
+
+Pressures Program::lead_at(double time) const noexcept {
+  return along(lead, time);
+}
+
+Pressures Program::at(double time) const noexcept {
+  Pressures out = along(knots, time);
   if (!tones.empty() && time >= tones_from && time < tones_to) {
     double sum = 0.0;
     for (const Tone& tone : tones) {
@@ -43,6 +50,7 @@ const std::vector<ExperimentInfo>& experiments() {
       {"free", "the muscles move the bar: steps and a multisine in the pressure difference"},
       {"pcu-step", "valve steps of several heights, up and down, from a held baseline"},
       {"pose", "the bar is held still at several angles"},
+      {"calibrate", "one recording per level: force sensors, pressure sensors, valves, the encoder's middle"},
       {"testbed-bundle", "all sweeps of the seed's chapter 3 into one dataset folder, with held-out runs"},
       {"all", "the same as testbed-bundle"},
   };

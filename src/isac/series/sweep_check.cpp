@@ -245,6 +245,10 @@ SweepVerdict check_sweep(const Recording& recording, const SweepExpectation& exp
   check_length(sweep);
   check_gaps(sweep);
   check_present(sweep);
+  if (!expected.held.empty()) {
+    detail::check_level(sweep);
+    return sweep.verdict;
+  }
   check_saturation(sweep);
   detail::check_motion(sweep);
   detail::check_pressure(sweep);

@@ -4,7 +4,7 @@
 /// A pure function of a recording and of what was asked for. Every remark is one plain sentence with the
 /// number found, the number that would do, and what to do about it; a remark either asks for the sweep again
 /// (`repeat`) or only informs. Checked: length, time gaps and lost samples, missing and frozen signals,
-/// saturation of force, pressure and converter, jumps of the encoder, pressure held or followed, range of
+/// a calibration's level that rests, saturation of force, pressure and converter, jumps of the encoder, pressure held or followed, range of
 /// angle and of speed in both directions, steps that settled.
 ///
 /// Speed here is a central difference of the angle over `SweepExpectation::speed_window` on either side: good
@@ -30,6 +30,12 @@ struct SensorRange {
   double step = 0;  ///< one code of the converter
 };
 
+/// A signal that must rest at its level through a calibration's recording.
+struct HeldSignal {
+  std::string column;    ///< "F1", "p2", "angle"
+  double tolerance = 0;  ///< SI: between both halves' means; twice that for the scatter of 50 ms means
+};
+
 /// What was asked for. NaN or an empty list means "not asked, don't check".
 struct SweepExpectation {
   std::string experiment;                                           ///< `# experiment:` of docs/formats.md
@@ -53,6 +59,7 @@ struct SweepExpectation {
       std::numeric_limits<double>::quiet_NaN();  ///< rad/s, faster than any joint: an encoder jump
   double force_capacity = std::numeric_limits<double>::quiet_NaN();  ///< N, of the force sensors
   double speed_window = 0.02;                                        ///< s, either side
+  std::vector<HeldSignal> held;  ///< a calibration's level: only this, length, gaps and range are checked
   std::vector<SensorRange> ranges;
 };
 
@@ -74,6 +81,11 @@ struct SweepFacts {
   double delta_pressure_high = std::numeric_limits<double>::quiet_NaN();
   double force_low = std::numeric_limits<double>::quiet_NaN();
   double force_high = std::numeric_limits<double>::quiet_NaN();
+  struct Level {
+    std::string column;
+    double mean = 0, scatter = 0;  ///< SI, of all samples
+  };
+  std::vector<Level> levels;  ///< of a calibration: what the signals showed, by the calibration before it
 };
 
 struct SweepVerdict {

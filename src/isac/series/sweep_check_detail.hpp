@@ -1,5 +1,5 @@
 /// @file
-/// Shared by the two halves of the sweep check: the recording's columns, its numbers, and the sentences'
+/// Shared by the parts of the sweep check: the recording's columns, its numbers, and the sentences'
 /// parts. Not for others.
 ///
 /// Units: SI. Threads: pure. Errors: none of its own.
@@ -34,6 +34,7 @@ struct Sweep {
 [[nodiscard]] std::string in_degrees(double rad);  ///< "57"
 
 void check_motion(Sweep& sweep);    ///< encoder, angle range, speeds, clamp, poses
+void check_level(Sweep& sweep);     ///< a calibration's level: at rest, inside the sensor's range
 void check_pressure(Sweep& sweep);  ///< held levels, steps that settle
 
 }  // namespace isac::series::detail
