@@ -35,6 +35,10 @@ echo "(the simulated valve unit was built with K_C = 1, T_C = 0.17 s)"
 say "5 of 5  Writing the controller's tables"
 "$programs/isac-identify" export "$out/params.toml" -o "$out/tables"
 
+for made in report.html valves.html signals.html params.toml tables/isac_parameters.h tables/isac_parameters.bin; do
+  [ -s "$out/$made" ] || { echo "the demo did not make $out/$made" >&2; exit 1; }
+done
+
 say "Done. Open these:"
 printf '  %s\n' "$out/report.html   the fit, with pictures" "$out/valves.html   the valve unit" \
   "$out/signals.html  every signal of every sweep" "$out/params.toml   what every program reads" \
