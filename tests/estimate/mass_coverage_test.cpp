@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <random>
 
 #include "isac/estimate/mass_fit.hpp"
 #include "isac/estimate/pose_design.hpp"
@@ -49,6 +51,48 @@ TEST(MassCoverage, intervals_cover_when_the_noise_is_told) {
   MassFitOptions options;
   options.torque_noise.fill(0.1);
   expect_covered(count(8, options, 0.1, 3000));
+}
+
+TEST(MassCoverage, intervals_cover_when_the_actuators_are_as_wrong_as_they_are_said_to_be) {
+  MassArm arm = soft_arm();
+  for (MassActuator& actuator : arm.actuators) {
+    actuator.A_error = 0.01 * std::abs(actuator.A);
+    actuator.B_error = 0.02 * actuator.B;
+  }
+  models::Coupling<double, 6> inverse;
+  ASSERT_TRUE(ok(models::inverse_coupling<double, 6>(arm.coupling, inverse)));
+  MassFitOptions options;
+  options.from_pressures = true;
+  int inside[3] = {}, random_only[3] = {};
+  for (std::uint32_t s = 0; s < kSeeds; ++s) {
+    std::mt19937 random(7000 + s);
+    std::normal_distribution<double> normal;
+    double A[6], B[6];  // the true ones; the arm holds what was identified
+    for (std::size_t j = 0; j < 6; ++j) {
+      A[j] = arm.actuators[j].A + arm.actuators[j].A_error * normal(random);
+      B[j] = arm.actuators[j].B + arm.actuators[j].B_error * normal(random);
+    }
+    auto poses = random_poses(arm, 40, 0, 8000 + s);
+    for (MassPose& pose : poses) {
+      const ArmVector phi = models::multiply<double, 6>(inverse, pose.angle);
+      const ArmVector torque = models::multiply_transposed<double, 6>(arm.coupling, pose.torque);
+      for (std::size_t j = 0; j < 6; ++j) {
+        const double r = arm.actuators[j].wheel_radius;
+        pose.delta_pressure[j] = (torque[j] + 0.02 * normal(random) - A[j] * r * r * phi[j]) / (B[j] * r);
+      }
+    }
+    const MassFit fit = fit_masses(arm, poses, options);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double error = std::abs(fit.masses[k].value - kTruth[k]);
+      inside[k] += error < fit.masses[k].ci_high - fit.masses[k].value ? 1 : 0;
+      random_only[k] += error < 1.96 * fit.random_errors[k] ? 1 : 0;
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_GE(inside[k], 184) << "m" << k + 1;
+    EXPECT_LE(inside[k], 196) << "m" << k + 1;
+  }
+  EXPECT_LT(random_only[0], 184) << "without the model's part the interval of m1 is too short";
 }
 
 TEST(MassCoverage, a_clean_record_is_rarely_called_biased) {
