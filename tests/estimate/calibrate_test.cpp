@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <vector>
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
@@ -191,6 +193,26 @@ TEST(Calibrate, middle_lies_halfway_when_the_side_matters) {
   EXPECT_NEAR(m.middle.value, 0.5 * (1011 + 990.5), 1e-9);
   EXPECT_NEAR(m.side_difference.value, 20.5, 1e-9);
   EXPECT_EQ(m.warnings.front().code, "sides_differ");
+}
+
+TEST(Calibrate, middle_is_told_apart_from_what_valves_and_play_do_to_the_rest_position) {
+  // rest = 500 + 4 counts per kPa · Δp ± 3; the valves stand 6 kPa apart from Δp = 0.
+  std::vector<MiddleApproach> approaches;
+  for (const double kilopascal : {6.0, -14.0, 26.0}) {
+    for (const int side : {1, -1}) {
+      approaches.push_back(approach(500 + 4 * kilopascal + 3 * side, side));
+      approaches.back().delta_pressure = 1e3 * kilopascal;
+    }
+  }
+  const MiddleCalibration m = calibrate_middle(approaches);
+  EXPECT_NEAR(m.middle.value, 500, 1e-9);
+  EXPECT_NEAR(m.shift.value, 4e-3, 1e-12);
+  EXPECT_NEAR(m.side_difference.value, 6, 1e-9);
+  // Half a step's rectangle is all that scatters: 1/12, over six approaches, and the way to Δp = 0 from their mean of 6 kPa,
+  // which is 6²/1600 of it on top: Σ (Δp − 6)² = 2 (0 + 20² + 20²) kPa².
+  EXPECT_NEAR(m.middle.std_error, std::sqrt((1.0 / 12) * (1.0 / 6 + 36.0 / 1600)), 1e-9);
+  for (MiddleApproach& a : approaches) a.delta_pressure = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(calibrate_middle(approaches).shift.identifiable);
 }
 
 TEST(Calibrate, middle_says_when_the_joint_still_moves_and_refuses_one_approach) {

@@ -189,5 +189,39 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"free", [](ExcitationOptions& o) { o.pressure_limit = 2 * kKgf; }, "limits_nonsense"},
         Refusal{"free", [](ExcitationOptions& o) { o.angle_limit = NAN; }, "limits_nonsense"}));
 
+TEST(Excitation, calibrates_every_signal_at_two_levels_or_more_and_vents_while_a_person_is_at_the_sensors) {
+  ExcitationOptions options;
+  options.weights = {50, 149.1};
+  std::set<std::string> levels_of_p1, levels_of_F1, levels_of_F2, levels_of_valve;
+  int from_either_side = 0;
+  for (const Program& program : make_programs("calibrate", options)) {
+    EXPECT_EQ(program.experiment, "calibration");
+    const std::string& text = program.calibration;
+    if (text.rfind("p1 =", 0) == 0) levels_of_p1.insert(text);
+    if (text.rfind("F1 =", 0) == 0) levels_of_F1.insert(text);
+    if (text.find("F2 =") != std::string::npos) levels_of_F2.insert(text);
+    if (text.rfind("p1_cmd =", 0) == 0) levels_of_valve.insert(text);
+    const Ask& ask = program.stages.front().ask;
+    const bool hands_on = ask.kind == Ask::Kind::kHangWeight || ask.kind == Ask::Kind::kConnectSupply;
+    if (hands_on) {
+      EXPECT_TRUE(program.in_codes);
+      EXPECT_EQ(program.at(1.0).p1, 0.0) << program.name;
+      EXPECT_EQ(program.at(1.0).p2, 0.0) << program.name;
+    }
+    if (text.rfind("angle = middle", 0) == 0) {
+      // It comes from the side that its line names: the lead begins beyond where it settles.
+      const double aside = program.lead_at(0.0).p2 - program.at(0.0).p2;
+      EXPECT_EQ(aside > 0, text.back() == '+') << program.name;
+      EXPECT_EQ(program.lead_at(program.lead.back().time).p2, program.at(0.0).p2);
+      ++from_either_side;
+    }
+  }
+  EXPECT_EQ(levels_of_p1.size(), 5u);
+  EXPECT_EQ(levels_of_F1.size(), 3u);
+  EXPECT_EQ(levels_of_F2.size(), 3u);
+  EXPECT_EQ(levels_of_valve.size(), 6u);
+  EXPECT_EQ(from_either_side, 6);
+}
+
 }  // namespace
 }  // namespace isac::series

@@ -363,5 +363,35 @@ TEST(SweepCheck, goes_without_pressures_where_the_rig_measures_none) {
   EXPECT_TRUE(check_sweep(made.recording, made.expected).keep());
 }
 
+/// Four seconds of a force at 149 N, swinging by `swing` at half a hertz and drifting by `drift` N/s.
+SweepVerdict level_verdict(double swing, double drift, double top) {
+  Recording recording;
+  recording.columns = {{"time", "s", {}}, {"angle", "rad", {}}, {"F1", "N", {}}};
+  for (int i = 0; i < 2000; ++i) {
+    const double t = 0.002 * i;
+    recording.columns[0].values.push_back(t);
+    recording.columns[1].values.push_back(0.0);
+    recording.columns[2].values.push_back(149.0 + swing * std::sin(kPi * t) + drift * t);
+  }
+  SweepExpectation expected;
+  expected.sample_period = 0.002;
+  expected.held = {{"F1", 0.5}};
+  expected.ranges = {{"F1", -10.0, top, 0.05}};
+  return check_sweep(recording, expected);
+}
+
+TEST(SweepCheck, keeps_a_level_at_rest_and_no_level_that_swings_drifts_or_stands_at_the_end_of_the_range) {
+  const SweepVerdict rest = level_verdict(0.0, 0.0, 190.0);
+  EXPECT_TRUE(rest.keep());
+  ASSERT_EQ(rest.facts.levels.size(), 1u);
+  EXPECT_NEAR(rest.facts.levels[0].mean, 149.0, 1e-9);
+  // A swing over whole periods drifts by nothing; its own scatter is swing/√2, against 1 N.
+  EXPECT_EQ(level_verdict(2.0, 0.0, 190.0).remarks.at(0).code, "not_at_rest");
+  EXPECT_TRUE(level_verdict(1.0, 0.0, 190.0).keep());
+  EXPECT_EQ(level_verdict(0.0, 0.3, 190.0).remarks.at(0).code, "not_at_rest");  // halves 0.6 N apart
+  EXPECT_TRUE(level_verdict(0.0, 0.2, 190.0).keep());                           // 0.4 N
+  EXPECT_EQ(level_verdict(0.0, 0.0, 149.0).remarks.at(0).code, "level_saturated");
+}
+
 }  // namespace
 }  // namespace isac::series
