@@ -1,5 +1,8 @@
 // isac-identify joint: A, B, C, D of a joint, or the parameters of any terms of the catalogue.
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -13,6 +16,7 @@
 #include "common/program.hpp"
 #include "identify/commands.hpp"
 #include "identify/inputs.hpp"
+#include "identify/joint_stream.hpp"
 #include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
@@ -32,7 +36,7 @@ struct Call {
   std::string rig, params, report, model, output, position = "angle", loss = "huber", differentiator;
   std::vector<std::string> terms;
   double block_seconds = std::nan("");
-  bool plain_regressors = false;
+  bool plain_regressors = false, stream = false;
 };
 
 /// "huber", "huber:0.05", "cauchy:0.05", "squared".
@@ -168,7 +172,8 @@ void print_summary(const estimate::JointFit& fit, const std::string& unit) {
   print_parameters(fit.parameters);
   fmt::print("rmse {:.4g} {} over {} rows", fit.rmse, unit, fit.samples);
   if (std::isfinite(fit.heldout_rmse)) fmt::print(", {:.4g} {} on held-out runs", fit.heldout_rmse, unit);
-  fmt::print("; noise floor {:.4g} {}\n", fit.noise_floor, unit);
+  if (std::isfinite(fit.noise_floor)) fmt::print("; noise floor {:.4g} {}", fit.noise_floor, unit);
+  fmt::print("\n");
   if (fit.angle_zero.used) fmt::print("· {}\n", fit.angle_zero.sentence);
   for (const estimate::ResidualTest& test : fit.tests)
     fmt::print("{} {}\n", test.passed ? "·" : "!", test.sentence);
@@ -176,6 +181,11 @@ void print_summary(const estimate::JointFit& fit, const std::string& unit) {
 }
 
 int run_joint(const Call& call, const std::string& json_path) {
+#ifdef __GLIBC__
+  // Columns come and go by the dozen: memory that was once given is kept, instead of page faults for each column anew.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+#endif
   for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
 
   estimate::JointFitOptions options;
@@ -235,25 +245,36 @@ int run_joint(const Call& call, const std::string& json_path) {
       .map = parse_maps(call.maps), .require_time = true, .hash = !call.params.empty()};
   std::vector<estimate::JointRun> runs, heldout;
   std::vector<series::Recording> recordings;
-  Warnings left_out;
-  for (series::Recording& recording : read_all(files.runs, reading)) {
-    if (recording.meta("experiment") == "pcu-step" && files.runs.size() > 1) {
-      left_out.push_back({"run_left_out", short_name(recording.source) +
-                                              " holds valve steps: use it with isac-identify pcu."});
-      continue;
+  estimate::JointFit fit;
+  if (call.stream || bytes_of(files.runs) >= kStreamFrom) {
+    fit = fit_stream(files.runs, reading, signals, options, recordings);
+    if (!files.heldout.empty())
+      fit.warnings.push_back({"heldout_not_read",
+                              "Runs this large are fitted in one pass: held-out runs were not "
+                              "predicted and residuals not tested."});
+  } else {
+    Warnings left_out;
+    for (series::Recording& recording : read_all(files.runs, reading)) {
+      if (recording.meta("experiment") == "pcu-step" && files.runs.size() > 1) {
+        left_out.push_back({"run_left_out", short_name(recording.source) +
+                                                " holds valve steps: use it with isac-identify pcu."});
+        continue;
+      }
+      runs.push_back(joint_run(recording, signals));
+      if (options.output_unit.empty()) options.output_unit = recording.column(signals.output).unit;
+      if (signals.position != "angle") options.position_unit = recording.column(signals.position).unit;
+      recording.columns.clear();  // the run has what the fit needs; its name and digits stay
+      recordings.push_back(std::move(recording));
     }
-    runs.push_back(joint_run(recording, signals));
-    if (options.output_unit.empty()) options.output_unit = recording.column(signals.output).unit;
-    if (signals.position != "angle") options.position_unit = recording.column(signals.position).unit;
-    recordings.push_back(std::move(recording));
-  }
-  for (const series::Recording& recording : read_all(files.heldout, reading)) {
-    if (recording.meta("experiment") == "pcu-step") continue;
-    heldout.push_back(joint_run(recording, signals));
-  }
+    for (const series::Recording& recording : read_all(files.heldout, reading)) {
+      if (recording.meta("experiment") == "pcu-step") continue;
+      heldout.push_back(joint_run(recording, signals));
+    }
 
-  estimate::JointFit fit = estimate::fit_joint(runs, heldout, options);
-  fit.warnings.insert(fit.warnings.end(), left_out.begin(), left_out.end());
+    options.keep_rows = !call.report.empty();
+    fit = estimate::fit_joint(runs, heldout, options);
+    fit.warnings.insert(fit.warnings.end(), left_out.begin(), left_out.end());
+  }
 
   if (!call.report.empty()) {
     report::JointReportInput input;
@@ -311,6 +332,8 @@ Body add_joint(CLI::App& program, std::string& json_path) {
       ->check(CLI::PositiveNumber);
   sub->add_flag("--plain-regressors", call->plain_regressors,
                 "take angle, speed and pressure as free of noise");
+  sub->add_flag("--stream", call->stream,
+                "one pass in bounded memory (files of 400 MB and more do it by themselves)");
   sub->add_option("-o,--params", call->params, "params.toml to write or update");
   sub->add_option("--report", call->report, "HTML report to write");
   sub->add_option("--json", json_path, "answer as JSON into a file, - for standard output");

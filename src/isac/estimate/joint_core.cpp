@@ -137,7 +137,8 @@ Eigen::VectorXd spread_out(const Eigen::VectorXd& part, const std::vector<int>& 
   return out;
 }
 
-/// S of the kept columns, zero for the nonlinear ones (their regressor noise enters the weights only).
+/// A matrix over all linear columns brought down to the kept ones, zero elsewhere: for S, whose part of nonlinear terms enters the
+/// weights only.
 Eigen::MatrixXd kept_excess(const Eigen::MatrixXd& full, const std::vector<int>& kept, int size) {
   Eigen::MatrixXd out = Eigen::MatrixXd::Zero(size, size);
   for (std::size_t i = 0; i < kept.size(); ++i)
@@ -199,14 +200,15 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
   Eigen::MatrixXd full_excess =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(linear), static_cast<Eigen::Index>(linear));
   if (correct) full_excess = noise_gram(rows, terms, nullptr, 0, rows.size());
+  Pass plain;
   {
     RobustProblem squared;
     squared.rows = rows.size();
     for (std::size_t k = 0; k < linear; ++k) squared.columns.push_back(rows.x(k).data());
     squared.output = rows.y().data();
-    const Pass pass =
+    plain =
         squared.pass(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(linear)), 0, rows.size(), true, false);
-    out.rank = find_rank(pass.gram, full_excess);
+    out.rank = find_rank(plain.gram, full_excess);
   }
   const std::vector<int> kept = out.rank.kept;
 
@@ -244,7 +246,17 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
       if (std::isfinite(stiffness) && std::isfinite(gain)) terms.set_baseline(stiffness, gain);
     };
     const int rounds = !robust && !correct ? 1 : (fixed_scale && !correct ? 1 : 3);
-    Eigen::VectorXd start = linear_start(problem, problem.nonlinear.start);
+    Eigen::VectorXd start;
+    if (nonlinear > 0) {
+      start = linear_start(problem, problem.nonlinear.start);
+    } else {  // least squares from the sums that are there already
+      const Eigen::MatrixXd gram = kept_excess(plain.gram, kept, size);
+      const Eigen::VectorXd root = gram.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+      Eigen::VectorXd moment(size);
+      for (int k = 0; k < size; ++k) moment[k] = plain.moment[kept[static_cast<std::size_t>(k)]];
+      const Eigen::MatrixXd unit = root.asDiagonal() * gram * root.asDiagonal();
+      start = root.cwiseProduct(unit.ldlt().solve(root.cwiseProduct(moment)));
+    }
     if (robust && fixed_scale) {
       problem.kind = options.loss.kind;
       problem.scale = options.loss.scale;

@@ -17,17 +17,21 @@ namespace {
 class CompressedCost final : public ceres::CostFunction {
  public:
   /// Ceres sees z_k = scale_k θ_k, so that its tolerances mean the same for every parameter.
-  CompressedCost(const RobustProblem& problem, Eigen::VectorXd scale)
-      : problem_(problem), scale_(std::move(scale)) {
+  /// `first` is the pass at `start`, where Ceres begins.
+  CompressedCost(const RobustProblem& problem, Eigen::VectorXd scale, const Eigen::VectorXd& start,
+                 const Pass& first)
+      : problem_(problem), scale_(std::move(scale)), start_(start.cwiseProduct(scale_)), first_(first) {
     set_num_residuals(problem.size() + 1);
     mutable_parameter_block_sizes()->push_back(problem.size());
   }
 
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     const int n = problem_.size();
-    const Eigen::VectorXd theta = Eigen::Map<const Eigen::VectorXd>(parameters[0], n).cwiseQuotient(scale_);
-    problem_.linearise(theta);
-    const Pass pass = problem_.pass(theta, 0, problem_.rows, true, false);
+    const Eigen::Map<const Eigen::VectorXd> z(parameters[0], n);
+    const Eigen::VectorXd theta = z.cwiseQuotient(scale_);
+    const bool at_start = z == start_;
+    if (!at_start) problem_.linearise(theta);
+    const Pass pass = at_start ? first_ : problem_.pass(theta, 0, problem_.rows, true, false);
     Eigen::MatrixXd normal = pass.gram;
     Eigen::VectorXd gradient = -pass.moment;
     double cost = pass.cost;
@@ -58,7 +62,8 @@ class CompressedCost final : public ceres::CostFunction {
 
  private:
   const RobustProblem& problem_;
-  Eigen::VectorXd scale_;
+  Eigen::VectorXd scale_, start_;
+  const Pass& first_;
 };
 
 Eigen::MatrixXd less_excess(const RobustProblem& problem, const Eigen::MatrixXd& matrix) {
@@ -73,29 +78,33 @@ double value_of(const RobustProblem& problem, const Pass& pass, const Eigen::Vec
 /// Newton on the piecewise quadratic cost of a linear problem; falls back to the reweighted step where Newton does not descend.
 void newton(const RobustProblem& problem, Eigen::VectorXd& theta) {
   const bool squared = problem.kind == Loss::Kind::kSquared;
-  Pass here = problem.pass(theta, 0, problem.rows, true, !squared);
+  // Only the first pass needs the Gram matrix: later steps use the curvature, and the Gram matrix where that fails.
+  Pass here = problem.pass(theta, 0, problem.rows, true, false);
+  const Eigen::VectorXd size = here.gram.diagonal().cwiseSqrt();
   for (int step = 0; step < 50; ++step) {
     Eigen::VectorXd descent = here.moment;
     if (problem.excess.size() > 0) descent += problem.excess * theta;
-    const Eigen::LLT<Eigen::MatrixXd> factor(
-        less_excess(problem, squared || step == 0 ? here.gram : here.curvature));
-    const Eigen::LLT<Eigen::MatrixXd> safe(less_excess(problem, here.gram));
-    if (safe.info() != Eigen::Success) return;
-    Eigen::VectorXd move = factor.info() == Eigen::Success ? Eigen::VectorXd(factor.solve(descent))
-                                                           : Eigen::VectorXd(safe.solve(descent));
+    const bool by_gram = here.curvature.size() == 0;
+    Eigen::LLT<Eigen::MatrixXd> factor(less_excess(problem, by_gram ? here.gram : here.curvature));
     const double before = value_of(problem, here, theta);
-    Eigen::VectorXd next = theta + move;
-    Pass there = problem.pass(next, 0, problem.rows, true, !squared);
+    Eigen::VectorXd move, next = theta;
+    Pass there;
+    bool descends = false;
     // Rounding of a sum over the rows is all the increase that is let pass.
-    if (!(value_of(problem, there, next) <= before + 1e-13 * std::abs(before))) {
-      move = safe.solve(descent);
+    const auto try_step = [&] {
+      move = factor.solve(descent);
       next = theta + move;
-      there = problem.pass(next, 0, problem.rows, true, !squared);
-      if (!(value_of(problem, there, next) <= before + 1e-13 * std::abs(before))) return;
+      there = problem.pass(next, 0, problem.rows, false, !squared);
+      descends = value_of(problem, there, next) <= before + 1e-13 * std::abs(before);
+    };
+    if (factor.info() == Eigen::Success) try_step();
+    if (!descends && !by_gram) {
+      factor.compute(less_excess(problem, problem.pass(theta, 0, problem.rows, true, false).gram));
+      if (factor.info() == Eigen::Success) try_step();
     }
+    if (!descends) return;
     theta = next;
     here = std::move(there);
-    const Eigen::VectorXd size = here.gram.diagonal().cwiseSqrt();
     if (move.cwiseProduct(size).norm() <= 1e-14 * theta.cwiseProduct(size).norm() || squared) return;
   }
 }
@@ -229,7 +238,7 @@ RobustSolution solve(const RobustProblem& problem, const Eigen::VectorXd& start)
   }
   ceres::Problem::Options ownership;
   ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  CompressedCost cost(problem, scale);
+  CompressedCost cost(problem, scale, solution.theta, first);
   ceres::Problem solver(ownership);
   Eigen::VectorXd z = solution.theta.cwiseProduct(scale);
   solver.AddResidualBlock(&cost, nullptr, z.data());

@@ -130,8 +130,12 @@ struct StreamingJointFit::State {
     base = pilot.spread * pilot.spread;
     plain_gram = Eigen::MatrixXd::Zero(size, size);
     plain_moment = Eigen::VectorXd::Zero(size);
+    pilot.residual = pilot.omega = {};
     clear_sample();
     ready = true;
+  }
+
+  void take_waiting() {
     std::vector<JointRun> held;
     held.swap(waiting);
     for (const JointRun& run : held) consume(run);
@@ -295,6 +299,16 @@ StreamingJointFit::~StreamingJointFit() = default;
 StreamingJointFit::StreamingJointFit(StreamingJointFit&&) noexcept = default;
 StreamingJointFit& StreamingJointFit::operator=(StreamingJointFit&&) noexcept = default;
 
+void StreamingJointFit::learn(std::vector<JointRun> runs) {
+  state_->waiting = std::move(runs);
+  state_->make_pilot();
+  state_->waiting.clear();
+}
+
+bool StreamingJointFit::knows_all_terms() const {
+  return state_->pilot.rank.kept.size() == state_->terms.linear().size();
+}
+
 void StreamingJointFit::add(const JointRun& block) {
   State& s = *state_;
   if (s.ready) {
@@ -307,7 +321,9 @@ void StreamingJointFit::add(const JointRun& block) {
   }
   append(s.waiting.back(), block);
   s.waiting_rows += block.time.size();
-  if (s.waiting_rows >= s.pilot_rows) s.make_pilot();
+  if (s.waiting_rows < s.pilot_rows) return;
+  s.make_pilot();
+  s.take_waiting();
 }
 
 StreamingJointFit StreamingJointFit::fork() const {
@@ -347,7 +363,10 @@ void StreamingJointFit::merge(StreamingJointFit& other) {
 
 JointFit StreamingJointFit::finish() {
   State& s = *state_;
-  if (!s.ready) s.make_pilot();
+  if (!s.ready) {
+    s.make_pilot();
+    s.take_waiting();
+  }
   std::vector<Eigen::Index> own(s.ranges.size(), -1);  // the zero of a resting run of its own
   Eigen::Index resting = 0;
   if (s.zero)

@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <vector>
 
 #include "isac/estimate/joint_fit.hpp"
 
@@ -26,6 +27,10 @@ class StreamingJointFit {
   StreamingJointFit(StreamingJointFit&&) noexcept;
   StreamingJointFit& operator=(StreamingJointFit&&) noexcept;
 
+  /// Makes the pilot from these rows instead of the first that are added; they are not counted.
+  void learn(std::vector<JointRun> runs);
+  /// Can every term be fitted from the pilot's rows? What they cannot tell is refused in the end.
+  [[nodiscard]] bool knows_all_terms() const;
   /// Consecutive rows of a run; another name begins another run.
   void add(const JointRun& block);
   /// An empty stream with this one's pilot, for another part of the data. The pilot must be made (enough rows added).

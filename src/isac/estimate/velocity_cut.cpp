@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "isac/series/statistics.hpp"
 
@@ -12,7 +13,7 @@ namespace isac::estimate {
 namespace {
 
 struct Passage {
-  double velocity, cube, torque;  ///< means of v and v³, median torque
+  double velocity, cube, torque;  ///< means over the same rows, those without spikes in the torque
 };
 
 /// Passages through the middle at nearly constant speed.
@@ -27,14 +28,13 @@ std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& 
     for (std::size_t i = run.begin; i < run.end; ++i) {
       if (std::abs(angle[i]) > half_width) continue;
       std::size_t end = i;
-      double low = velocity[i], high = velocity[i], sum = 0, cubes = 0;
+      double low = velocity[i], high = velocity[i], sum = 0;
       torque.clear();
       while (end < run.end && std::abs(angle[end]) <= half_width &&
              (end == i || rows.time[end] - rows.time[end - 1] <= 2.5 * run.interval)) {
         low = std::min(low, velocity[end]);
         high = std::max(high, velocity[end]);
         sum += linear[end];
-        cubes += cube[end];
         torque.push_back(offset[end]);
         ++end;
       }
@@ -42,8 +42,23 @@ std::vector<Passage> passages(const JointRows& rows, const std::vector<double>& 
       const bool steady = high - low <= 0.2 * std::abs(mean);
       const bool through = end > i + 2 && (angle[end - 1] - angle[i]) * mean > 0 &&
                            std::abs(angle[end - 1] - angle[i]) > half_width;
-      if (steady && through)
-        out.push_back({mean, cubes / static_cast<double>(end - i), series::median(torque)});
+      if (steady && through) {
+        // A median of the torque beside means of the speed would be off by a twelfth of the speed's bend over the passage.
+        const double middle = series::median(torque);
+        double limit = 4.0 * series::robust_deviation(torque, false);
+        if (!(limit > 0)) limit = std::numeric_limits<double>::infinity();
+        Passage passage{0, 0, 0};
+        double count = 0;
+        for (std::size_t k = i; k < end; ++k) {
+          if (std::abs(offset[k] - middle) > limit) continue;
+          passage.velocity += linear[k];
+          passage.cube += cube[k];
+          passage.torque += offset[k];
+          ++count;
+        }
+        if (count > 0)
+          out.push_back({passage.velocity / count, passage.cube / count, passage.torque / count});
+      }
       i = end;
     }
   }
@@ -77,8 +92,10 @@ VelocityCut velocity_cut(const JointRows& rows, const JointTerms& terms, const E
       offset[i] -= terms.nonlinear_value(rows.state(i), theta.data() + terms.linear().size(), nullptr);
   double reach = 0;
   if (rows.size() > 0) {
-    std::vector<double> size = rows.input[static_cast<int>(Input::kAngle)];
-    for (double& v : size) v = std::abs(v);
+    const std::vector<double>& angle = rows.input[static_cast<int>(Input::kAngle)];
+    const std::size_t stride = std::max<std::size_t>(1, angle.size() / 100000);
+    std::vector<double> size;
+    for (std::size_t i = 0; i < angle.size(); i += stride) size.push_back(std::abs(angle[i]));
     reach = series::quantile(size, 0.99);
   }
   const std::vector<Passage> points = passages(rows, offset, cube, linear, 0.1 * reach);

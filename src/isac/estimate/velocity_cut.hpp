@@ -3,7 +3,7 @@
 ///
 ///   T − A r² φ − B r Δp = −(C φ̇³ + D φ̇) at passages through |φ| ≤ φ_c during which the speed changes by less than a fifth
 ///
-/// One passage is one point (mean speed, median torque), so that points are nearly independent even under coloured noise; C and
+/// One passage is one point (means of speed and torque over the same rows, spikes left out), so that points are nearly independent even under coloured noise; C and
 /// D follow by least squares over the points with heteroscedastic (HC3) errors. A cross-check of the main fit, not its replacement.
 /// Threads: pure. Errors: none; with fewer than eight passages C and D are not identifiable, with the reason.
 #pragma once

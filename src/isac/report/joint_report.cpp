@@ -41,6 +41,16 @@ void add_key_figures(Document& page, const JointView& view) {
   page.cards(cards);
 }
 
+/// A file's name that may be broken behind its punctuation, so that the table stays within the page.
+std::string breakable(const std::string& name) {
+  std::string out;
+  for (const char c : name) {
+    out += c;
+    if (c == '_' || c == '-' || c == '.') out += "\u200b";
+  }
+  return out;
+}
+
 void add_runs(Document& page, const JointView& view) {
   Table table{.caption = "Runs. Speed: 95 % of the rows are slower.",
               .columns = {{"No.", true}, {"File"}, {"Experiment"}, {"Rows", true}, {"Duration (s)", true}},
@@ -54,7 +64,7 @@ void add_runs(Document& page, const JointView& view) {
     const RunView& run = view.runs[k];
     const estimate::RunResidual& rows = *run.residual;
     std::vector<std::string> row = {
-        whole(static_cast<double>(k + 1)), run.name,
+        whole(static_cast<double>(k + 1)), breakable(run.name),
         run.run == nullptr || run.run->experiment.empty() ? "–" : run.run->experiment,
         whole(static_cast<double>(rows.time.size())), number(rows.time.back() - rows.time.front(), 3)};
     if (view.has_pressure) {
@@ -160,8 +170,10 @@ void add_next_steps(Document& page, const JointView& view) {
   if (std::any_of(view.fit->tests.begin(), view.fit->tests.end(),
                   [](const auto& test) { return !test.passed; }))
     next.push_back(
-        "A test of the residual is not passed: run isac-explain on this dataset; it names the effect that is "
-        "missing, or says that the disagreement is too small to matter.");
+        "A test of the residual is not passed: fit again with the term that its sentence names "
+        "(`isac-identify "
+        "joint --terms …`, terms in docs/effects.md) and keep it if the held-out runs are then predicted "
+        "better.");
   next.insert(next.end(), view.input->next_steps.begin(), view.input->next_steps.end());
   if (next.empty())
     next.push_back(
@@ -220,6 +232,7 @@ std::string render_joint_report(const JointReportInput& input) {
   std::vector<std::string> names;
   for (const Estimated& parameter : view.fit->parameters) names.push_back(parameter.name);
   page.correlation("Correlation of the estimates.", names, view.fit->correlation);
+  if (view.fit->angle_zero.used) page.paragraph(view.fit->angle_zero.sentence);
   page.paragraph(
       "Standard errors hold under coloured noise: they come from " +
       whole(static_cast<double>(view.fit->blocks)) + " blocks of " + number(view.fit->block_seconds, 3) +

@@ -48,9 +48,9 @@ void solve_in_place(Matrix& a, std::array<double, kMaxOrder + 1>& b, int order) 
 
 namespace detail {
 
-/// y_i = Σ_j w_j x_{i+j}, i in [0, count): sixteen rows at a time, each summed in the kernel's order.
+/// y_i = Σ_j w_j x_{i+j}, i in [0, count): sixty-four rows at a time, each summed in the kernel's order.
 ISAC_SIMD void slide(const double* x, const double* w, std::size_t taps, std::size_t count, double* y) {
-  constexpr std::size_t kRows = 16;
+  constexpr std::size_t kRows = 64;  // eight chains of additions hide each other's latency
   std::size_t i = 0;
   for (; i + kRows <= count; i += kRows) {
     double sum[kRows] = {};
