@@ -220,6 +220,16 @@ TEST(Masses, the_actuators_errors_are_part_of_the_standard_errors_and_do_not_ave
   EXPECT_TRUE(has_warning(wrong, "actuator_model"));
 }
 
+TEST(Masses, a_joint_that_scatters_more_than_the_others_is_named) {
+  const MassArm arm = soft_arm();
+  auto poses = random_poses(arm, 30, 0.05, 71);
+  EXPECT_FALSE(has_warning(fit_masses(arm, poses, {}), "noise_differs"));
+  std::mt19937 random(72);
+  std::normal_distribution<double> normal;
+  for (MassPose& pose : poses) pose.torque[2] += 0.2 * normal(random);
+  EXPECT_NE(text_of(fit_masses(arm, poses, {}), "noise_differs").find("joint 3"), std::string::npos);
+}
+
 TEST(Masses, what_the_poses_cannot_tell_is_refused_by_name) {
   const MassArm arm = soft_arm();
   std::vector<MassPose> poses{pose_of_6_4()};

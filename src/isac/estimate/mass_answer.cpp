@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 
 #include "isac/estimate/mass_problem.hpp"
@@ -8,6 +9,45 @@
 namespace isac::estimate {
 
 using Kind = MassUnknown::Kind;
+
+namespace {
+
+constexpr double kLevel = 0.01;  // of a false alarm over all joints
+
+/// One noise for all joints is a supposition where none was told: says which joint scatters more than the others.
+void check_equal_noise(const MassProblem& problem, const MassState& state, Warnings& warnings) {
+  ArmVector sum{}, count{};
+  double all = 0, rows = 0;
+  for (std::size_t i = 0; i < problem.data.size(); ++i) {
+    if (!state.informative[i]) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    const Eigen::VectorXd x = state.jacobian.row(row);
+    const double left = 1 - x.dot(state.covariance * x);
+    if (left < 1e-6) continue;
+    const double square = state.residual[row] * state.residual[row] / left;
+    sum[problem.data[i].joint] += square;
+    count[problem.data[i].joint] += 1;
+    all += square;
+    rows += 1;
+  }
+  for (std::size_t j = 0; j < kArmJoints; ++j) {
+    const double others = rows - count[j], share = static_cast<double>(state.freedom) / rows;
+    if (count[j] < 3 || others < 3 || !(all > sum[j])) continue;
+    const double ratio = (sum[j] / count[j]) / ((all - sum[j]) / others);
+    const boost::math::fisher_f f(count[j] * share, others * share);
+    if (boost::math::cdf(boost::math::complement(f, ratio)) * static_cast<double>(kArmJoints) >= kLevel)
+      continue;
+    warnings.push_back(
+        {"noise_differs",
+         fmt::format(
+             "The torques of joint {} scatter {:.1f} times as much as the others', so the intervals of "
+             "masses "
+             "that hang on it are too narrow: give torque_noise of every [[actuator]] in the arm file.",
+             j + 1, std::sqrt(ratio))});
+  }
+}
+
+}  // namespace
 
 void add_warnings(const MassProblem& problem, const Eigen::VectorXd& values, const MassState& state,
                   MassFit& fit) {
@@ -24,6 +64,7 @@ void add_warnings(const MassProblem& problem, const Eigen::VectorXd& values, con
                                         "give yours with --torque-noise.",
                                         fit.torque_noise)});
   }
+  if (fit.noise_estimated && state.freedom > 0) check_equal_noise(problem, state, warnings);
   std::string left_out, named;
   for (const MassPoseResult& pose : fit.poses) {
     std::string& list = pose.left_out ? left_out : named;
