@@ -313,7 +313,9 @@ int run_calibrate(const Call& call, const std::string& json_path) {
   std::map<std::string, std::vector<Level>> by_signal;
   for (const Level& level : levels) by_signal[level.signal].push_back(level);
   if (by_signal.empty())
-    throw Error(ErrorKind::kUsage, "no_levels", "names no levels; give recordings or --level");
+    throw Error(ErrorKind::kUsage, "no_levels",
+                "found no level of a calibration; give a folder of isac-log calibrate, recordings with '# "
+                "calibration:', or --level");
   const Found found = calibrate_all(by_signal, recordings, rig);
 
   record::Answer answer;

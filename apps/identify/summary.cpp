@@ -9,14 +9,16 @@
 namespace isac::apps {
 
 void print_parameters(const std::vector<Estimated>& parameters) {
-  fmt::print("{:<20} {:>13}  {:>11}  {:<27} {}\n", "parameter", "value", "std. error", "95 % interval",
+  std::size_t width = 20;
+  for (const Estimated& p : parameters) width = std::max(width, p.name.size());
+  fmt::print("{:<{}} {:>13}  {:>11}  {:<27} {}\n", "parameter", width, "value", "std. error", "95 % interval",
              "unit");
   for (const Estimated& p : parameters) {
     if (p.identifiable) {
-      fmt::print("{:<20} {:>13.6g}  {:>11.3g}  {:<27} {}\n", p.name, p.value, p.std_error,
+      fmt::print("{:<{}} {:>13.6g}  {:>11.3g}  {:<27} {}\n", p.name, width, p.value, p.std_error,
                  fmt::format("[{:.6g}, {:.6g}]", p.ci_low, p.ci_high), p.unit);
     } else {
-      fmt::print("{:<20} {:>13}  {}\n", p.name, "refused", p.reason);
+      fmt::print("{:<{}} {:>13}  {}\n", p.name, width, "refused", p.reason);
     }
   }
 }
