@@ -131,10 +131,11 @@ void Document::table(const Table& table) {
         std::find(table.emphasised.begin(), table.emphasised.end(), r) != table.emphasised.end();
     out += set_off ? "<tr class=\"set-off\">" : "<tr>";
     for (std::size_t c = 0; c < table.columns.size(); ++c)
-      out +=
-          std::string(table.columns[c].numeric ? "<td class=\"n\">"
-                                               : (glyphs(cells[c][r]) > 40 ? "<td class=\"w\">" : "<td>")) +
-          cells[c][r] + "</td>";
+      out += std::string(table.columns[c].numeric                          ? "<td class=\"n\">"
+                         : cells[c][r].find("\u200b") != std::string::npos ? "<td class=\"b\">"
+                         : glyphs(cells[c][r]) > 40                        ? "<td class=\"w\">"
+                                                                           : "<td>") +
+             cells[c][r] + "</td>";
     out += "</tr>\n";
   }
   block(out + "</tbody></table></div>\n");

@@ -30,7 +30,7 @@ tbody td { padding: 3px 12px 3px 0; vertical-align: top; }
 tbody tr:last-child td { border-bottom: 1.5px solid #222; }
 tbody tr + tr td { border-top: 1px solid #ececec; }
 th.n, td.n { text-align: right; padding-left: 12px; }
-tbody td { white-space: nowrap; } td.w { white-space: normal; min-width: 16em; }
+tbody td { white-space: nowrap; } td.w { white-space: normal; min-width: 16em; } td.b { white-space: normal; min-width: 10em; }
 tr.set-off td { background: #fff7e6; }
 table.correlation td, table.correlation th { padding: 4px 10px; text-align: right; border: 0; }
 table.correlation tbody th { font-weight: 600; text-align: left; }
