@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "isac/core/error.hpp"
+#include "isac/estimate/joint_rows.hpp"
 #include "joint_data.hpp"
 
 using namespace isac;
@@ -232,4 +233,30 @@ TEST(JointFit, corrects_the_bias_that_noise_of_pressure_and_speed_makes) {
   EXPECT_LT(std::abs(corrected_error[3]), std::abs(plain_error[3]));
   EXPECT_LT(std::abs(corrected_error[3]), 0.05);
   EXPECT_LT(std::abs(corrected_error[2]), 0.05);
+}
+
+TEST(JointFit, reads_a_late_output_later_and_never_across_a_gap) {
+  std::vector<double> time{0.000, 0.002, 0.004, 0.010, 0.012}, line;
+  for (const double t : time) line.push_back(3.0 * t + 1.0);
+  const auto out = estimate::advanced(time, line, 0.00016, 0.002);
+  for (const std::size_t i : {0u, 1u, 3u})
+    EXPECT_NEAR(out[i], 3.0 * (time[i] + 0.00016) + 1.0, 1e-14);  // rounding
+  EXPECT_TRUE(std::isnan(out[2])) << "the next sample is six milliseconds away";
+  EXPECT_TRUE(std::isnan(out[4])) << "nothing is known behind the last sample";
+}
+
+TEST(JointFit, a_late_force_is_no_damping_once_its_lag_is_known) {
+  const Truth truth;
+  auto run = record(fast(), truth, {.force = 0, .pressure = 0, .encoder_steps = 0, .jitter = 0}, 12);
+  constexpr double kLag = 0.001;
+  for (std::size_t i = run.output.size(); i-- > 1;)  // a quarter of an interval late
+    run.output[i] -= (run.output[i] - run.output[i - 1]) * kLag * 250.0;
+  auto options = options_for(truth);
+  const auto late = estimate::fit_joint(std::vector{run}, {}, options);
+  options.output_lag = kLag;
+  const auto mended = estimate::fit_joint(std::vector{run}, {}, options);
+  // A r² τ = 8.5 mN m s, six per cent of D; straight lines between samples leave a hundredth of that.
+  EXPECT_NEAR(find(late.parameters, "D").value, truth.D + truth.A * truth.radius * truth.radius * kLag,
+              0.001);
+  EXPECT_NEAR(find(mended.parameters, "D").value, truth.D, 0.0002);
 }
