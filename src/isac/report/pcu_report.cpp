@@ -172,9 +172,8 @@ void add_next_steps(Document& page, const PcuReportInput& input) {
       next.push_back("For " + parameter.name + ": " + parameter.reason);
   if (!input.fit->first_order)
     next.push_back(
-        "At least one step is not of first order: use the lag only for steps of the size recorded here, or "
-        "let "
-        "isac-explain name the shape that is missing.");
+        "At least one step is not of first order: use the lag only for steps of the size recorded here; the "
+        "step's own sentence names the shape that comes closer.");
   if (input.fit->directions_differ)
     next.push_back("Filling and venting differ: give the controller both lags, or the slower one.");
   next.insert(next.end(), input.next_steps.begin(), input.next_steps.end());
