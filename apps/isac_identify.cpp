@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
 
   std::string json_path;
   std::vector<Body> bodies;
-  for (auto* add : {add_joint, add_motion, add_pcu, add_muscle, add_masses, add_calibrate, add_check, add_export, add_diff}) {
+  for (auto* add : {add_joint, add_motion, add_pcu, add_muscle, add_masses, add_calibrate, add_check,
+                    add_export, add_diff}) {
     bodies.push_back(add(app, json_path));
   }
   return run_program(app, argc, argv, json_path, [&app, &bodies] {
