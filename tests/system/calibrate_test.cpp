@@ -115,7 +115,8 @@ TEST_F(Calibrate, records_each_level_with_its_counts_and_what_it_is_a_level_of) 
   for (const char* name : {"enc0", "ai0", "ai4", "ao0", "ao1", "p1", "F1"})
     EXPECT_NE(valve.find(name), nullptr) << name;
   for (const double code : valve.column("ao1").values) ASSERT_EQ(code, 4095);
-  for (const double code : read("calibration-F2_50N").column("ao0").values) ASSERT_EQ(code, 0);  // vented
+  const series::Recording weight = read("calibration-F2_50N");
+  for (const double code : weight.column("ao0").values) ASSERT_EQ(code, 0);  // vented
   const test::Run run = identify({"calibrate", folder_ / "levels", "--json", "-"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("F1: a line"), std::string::npos) << run.out;  // three levels of force tell
