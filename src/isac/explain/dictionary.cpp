@@ -1,0 +1,163 @@
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/screen.hpp"
+
+namespace isac::explain {
+namespace {
+
+/// Signals of one row, each scaled to its range in the data.
+struct Scaled {
+  double angle, velocity, dp, p0, sign, time, day, rate1, rate2, age;
+};
+
+struct Function {
+  const char* name;
+  std::vector<std::string> variables;
+  std::function<double(const Scaled&)> value;
+};
+
+const std::vector<Function>& functions() {
+  static const std::vector<Function> all = {
+      {"1", {}, [](const Scaled&) { return 1.0; }},
+      {"angle", {"angle"}, [](const Scaled& s) { return s.angle; }},
+      {"angle^2", {"angle"}, [](const Scaled& s) { return s.angle * s.angle; }},
+      {"angle^3", {"angle"}, [](const Scaled& s) { return s.angle * s.angle * s.angle; }},
+      {"angle^4", {"angle"}, [](const Scaled& s) { return std::pow(s.angle, 4); }},
+      {"angle^5", {"angle"}, [](const Scaled& s) { return std::pow(s.angle, 5); }},
+      {"|angle|", {"angle"}, [](const Scaled& s) { return std::abs(s.angle); }},
+      {"velocity", {"velocity"}, [](const Scaled& s) { return s.velocity; }},
+      {"velocity |velocity|", {"velocity"}, [](const Scaled& s) { return s.velocity * std::abs(s.velocity); }},
+      {"|velocity|", {"velocity"}, [](const Scaled& s) { return std::abs(s.velocity); }},
+      {"velocity^5", {"velocity"}, [](const Scaled& s) { return std::pow(s.velocity, 5); }},
+      {"sqrt|velocity| sgn", {"velocity"}, [](const Scaled& s) { return std::sqrt(std::abs(s.velocity)) * s.sign; }},
+      {"sgn", {"direction"}, [](const Scaled& s) { return s.sign; }},
+      {"sgn |angle|", {"direction", "angle"}, [](const Scaled& s) { return s.sign * std::abs(s.angle); }},
+      {"sgn angle", {"direction", "angle"}, [](const Scaled& s) { return s.sign * s.angle; }},
+      {"sgn angle^2", {"direction", "angle"}, [](const Scaled& s) { return s.sign * s.angle * s.angle; }},
+      {"sgn p_mean", {"direction", "mean_pressure"}, [](const Scaled& s) { return s.sign * s.p0; }},
+      {"sgn |dp|", {"direction", "delta_pressure"}, [](const Scaled& s) { return s.sign * std::abs(s.dp); }},
+      {"sgn dp", {"direction", "delta_pressure"}, [](const Scaled& s) { return s.sign * s.dp; }},
+      {"sgn time", {"direction", "time"}, [](const Scaled& s) { return s.sign * s.day; }},
+      {"velocity |angle|", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * std::abs(s.angle); }},
+      {"velocity angle", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * s.angle; }},
+      {"velocity angle^2", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * s.angle * s.angle; }},
+      {"velocity dp", {"velocity", "delta_pressure"}, [](const Scaled& s) { return s.velocity * s.dp; }},
+      {"velocity |dp|", {"velocity", "delta_pressure"}, [](const Scaled& s) { return s.velocity * std::abs(s.dp); }},
+      {"velocity p_mean", {"velocity", "mean_pressure"}, [](const Scaled& s) { return s.velocity * s.p0; }},
+      {"dp", {"delta_pressure"}, [](const Scaled& s) { return s.dp; }},
+      {"dp^2", {"delta_pressure"}, [](const Scaled& s) { return s.dp * s.dp; }},
+      {"dp^3", {"delta_pressure"}, [](const Scaled& s) { return s.dp * s.dp * s.dp; }},
+      {"|dp|", {"delta_pressure"}, [](const Scaled& s) { return std::abs(s.dp); }},
+      {"dp angle", {"delta_pressure", "angle"}, [](const Scaled& s) { return s.dp * s.angle; }},
+      {"dp |angle|", {"delta_pressure", "angle"}, [](const Scaled& s) { return s.dp * std::abs(s.angle); }},
+      {"dp angle^2", {"delta_pressure", "angle"}, [](const Scaled& s) { return s.dp * s.angle * s.angle; }},
+      {"dp^2 angle", {"delta_pressure", "angle"}, [](const Scaled& s) { return s.dp * s.dp * s.angle; }},
+      {"p_mean", {"mean_pressure"}, [](const Scaled& s) { return s.p0; }},
+      {"p_mean angle", {"mean_pressure", "angle"}, [](const Scaled& s) { return s.p0 * s.angle; }},
+      {"p_mean dp", {"mean_pressure", "delta_pressure"}, [](const Scaled& s) { return s.p0 * s.dp; }},
+      {"p_mean^2", {"mean_pressure"}, [](const Scaled& s) { return s.p0 * s.p0; }},
+      {"p1 rate", {"pressure_rate"}, [](const Scaled& s) { return s.rate1; }},
+      {"p2 rate", {"pressure_rate"}, [](const Scaled& s) { return s.rate2; }},
+      {"|p1 rate|", {"pressure_rate"}, [](const Scaled& s) { return std::abs(s.rate1); }},
+      {"|p2 rate|", {"pressure_rate"}, [](const Scaled& s) { return std::abs(s.rate2); }},
+      {"time", {"time"}, [](const Scaled& s) { return s.time; }},
+      {"day", {"time"}, [](const Scaled& s) { return s.day; }},
+      {"day angle", {"time", "angle"}, [](const Scaled& s) { return s.day * s.angle; }},
+      {"day dp", {"time", "delta_pressure"}, [](const Scaled& s) { return s.day * s.dp; }},
+      {"day velocity", {"time", "velocity"}, [](const Scaled& s) { return s.day * s.velocity; }},
+      {"after reversal 0.02", {"direction", "memory"}, [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.02); }},
+      {"after reversal 0.1", {"direction", "memory"}, [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.1); }},
+  };
+  return all;
+}
+
+double largest(double so_far, double value) { return std::isfinite(value) ? std::max(so_far, std::abs(value)) : so_far; }
+
+}  // namespace
+
+std::vector<DictionaryColumn> dictionary(const Predictor& predictor) {
+  const Prepared& data = predictor.data();
+  Scaled top{1e-9, 1e-9, 1e-9, 1e-9, 1, 1e-9, 1e-9, 1e-9, 1e-9, 1};
+  struct Extra {
+    std::vector<double> rate[2], age, sign;
+  };
+  std::vector<Extra> extra(data.runs.size());
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const PreparedRun& run = data.runs[r];
+    Extra& e = extra[r];
+    const std::size_t n = run.time.size();
+    for (int i = 0; i < 2; ++i) {
+      e.rate[i].assign(n, 0.0);
+      for (std::size_t k = 5; k + 5 < n && run.has_pressure; ++k)
+        e.rate[i][k] = (run.pressure[i][k + 5] - run.pressure[i][k - 5]) / (10 * run.interval);
+    }
+    e.age.assign(n, 1.0);
+    e.sign.assign(n, 0.0);
+    double sign = 0, at = 0;
+    for (std::size_t k = 0; k < run.angle.size(); ++k) {
+      const double w = run.dry_velocity[k];
+      if (w != 0 && (w > 0 ? 1.0 : -1.0) != sign) {
+        sign = w > 0 ? 1 : -1;
+        at = run.angle[k];
+      }
+      e.age[k] = std::abs(run.angle[k] - at);
+      e.sign[k] = w > 0 ? 1 : (w < 0 ? -1 : 0);
+      top.angle = largest(top.angle, run.angle[k]);
+      top.velocity = largest(top.velocity, run.velocity[k]);
+      if (run.has_pressure) {
+        top.dp = largest(top.dp, 0.5 * (run.pressure[1][k] - run.pressure[0][k]));
+        top.p0 = largest(top.p0, 0.5 * (run.pressure[1][k] + run.pressure[0][k]) - data.rig.initial_pressure);
+        top.rate1 = largest(top.rate1, e.rate[0][k]);
+        top.rate2 = largest(top.rate2, e.rate[1][k]);
+      }
+      top.time = largest(top.time, run.time[k]);
+      top.day = largest(top.day, run.day_offset + run.time[k]);
+    }
+  }
+  std::vector<DictionaryColumn> out;
+  const auto n = static_cast<Eigen::Index>(data.rows.size());
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
+    if (!data.has(chain)) continue;
+    static constexpr const char* kNames[] = {"torque", "p1", "p2", "motion"};
+    const std::size_t first = out.size();
+    for (const Function& f : functions()) {
+      DictionaryColumn c;
+      c.name = std::string(kNames[static_cast<int>(chain)]) + ": " + f.name;
+      c.variables = f.variables;
+      c.rows = Eigen::VectorXd::Zero(n);
+      out.push_back(std::move(c));
+    }
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Row& row = data.rows[static_cast<std::size_t>(i)];
+      if (row.chain != chain) continue;
+      const PreparedRun& run = data.runs[row.run];
+      const Extra& e = extra[row.run];
+      const std::size_t k = row.sample;
+      Scaled s{};
+      if (!run.angle.empty()) {
+        s.angle = run.angle[k] / top.angle;
+        s.velocity = run.velocity[k] / top.velocity;
+        s.sign = e.sign[k];
+        s.age = e.age[k];
+      }
+      if (run.has_pressure) {
+        s.dp = 0.5 * (run.pressure[1][k] - run.pressure[0][k]) / top.dp;
+        s.p0 = (0.5 * (run.pressure[1][k] + run.pressure[0][k]) - data.rig.initial_pressure) / top.p0;
+        s.rate1 = e.rate[0][k] / top.rate1;
+        s.rate2 = e.rate[1][k] / top.rate2;
+      }
+      s.time = run.time[k] / top.time;
+      s.day = (run.day_offset + run.time[k]) / top.day;
+      for (std::size_t f = 0; f < functions().size(); ++f) {
+        const double value = functions()[f].value(s);
+        out[first + f].rows[i] = std::isfinite(value) ? value : 0.0;
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,296 @@
+#include "isac/explain/fit.hpp"
+
+#include <ceres/cost_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace isac::explain {
+namespace {
+
+constexpr double kDifference = 1e-4;  // of a coordinate's scale
+
+void set(ModelPoint& model, const Coordinate& c, double value) {
+  if (c.base >= 0) {
+    model.base[static_cast<std::size_t>(c.base)] = value;
+  } else {
+    model.effects[static_cast<std::size_t>(c.effect)].values[static_cast<std::size_t>(c.component)] = value;
+  }
+}
+
+Coordinate effect_coordinate(const Active& active, int effect, int component, bool tolerance) {
+  const auto k = static_cast<std::size_t>(component);
+  const Hypothesis& h = *active.hypothesis;
+  Coordinate c;
+  c.effect = effect;
+  c.component = component;
+  c.lower = h.lower[k];
+  c.upper = h.upper[k];
+  const auto& info = h.info().parameters[component];
+  c.scale = tolerance ? 0.5 * (c.upper - c.lower) : std::max(std::abs(info.typical), std::abs(active.values[k]));
+  if (!(c.scale > 0)) c.scale = 1;
+  c.chains = h.chains;
+  c.tolerance = tolerance;
+  return c;
+}
+
+void add_base(const Predictor& predictor, const ModelPoint& model, unsigned chains, std::vector<Coordinate>& out) {
+  for (std::size_t j = 0; j < predictor.base().size(); ++j) {
+    const BaseParameter& b = predictor.base()[j];
+    if ((b.chains & chains) == 0) continue;
+    Coordinate c;
+    c.base = static_cast<int>(j);
+    c.lower = b.lower;
+    c.upper = b.upper;
+    c.scale = std::max(std::abs(b.start), 1e-3 * std::abs(model.base[j]));
+    c.chains = b.chains;
+    out.push_back(c);
+  }
+}
+
+/// Rows of the chains asked for, in the order of the data.
+std::vector<Eigen::Index> rows_of(const Prepared& data, unsigned chains) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if ((bit(data.rows[i].chain) & chains) != 0) rows.push_back(static_cast<Eigen::Index>(i));
+  return rows;
+}
+
+bool reads_force(const ModelPoint& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [](const Active& a) { return a.hypothesis->reads_force; });
+}
+
+/// Derivative of all rows by one coordinate; other chains' rows are left as they are.
+void differentiate(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here, const Coordinate& c,
+                   double value, Eigen::VectorXd& out) {
+  ModelPoint there = model;
+  if (c.base >= 0 && (c.chains & kPressureChains) == 0 && !reads_force(model)) {
+    // Linear: the prediction of a baseline that consists of this term alone.
+    std::fill(there.base.begin(), there.base.begin() + static_cast<std::ptrdiff_t>(there.base.size()), 0.0);
+    for (std::size_t j = 0; j < there.base.size(); ++j)
+      if ((predictor.base()[j].chains & kPressureChains) != 0) there.base[j] = model.base[j];
+    there.base[static_cast<std::size_t>(c.base)] = c.scale;
+    std::erase_if(there.effects, [](const Active& a) { return !(a.hypothesis->reads_angle || a.hypothesis->reads_pressure || a.hypothesis->info().hook == models::Hook::kMusclePressure); });
+    predictor.predict(there, c.chains, out);
+    out /= c.scale;
+    return;
+  }
+  double step = kDifference * c.scale;
+  if (c.effect >= 0 && !c.tolerance) {
+    // Events move by whole samples: a step that moves them by less shows nothing.
+    const auto& h = *model.effects[static_cast<std::size_t>(c.effect)].hypothesis;
+    if (std::isnan(h.info().parameters[c.component].null_value)) step *= 10;
+  }
+  if (value + step > c.upper) step = -step;
+  set(there, c, value + step);
+  predictor.predict(there, c.chains, out);
+  out = (out - here) / step;
+}
+
+class Rows final : public ceres::CostFunction {
+ public:
+  Rows(const Predictor& predictor, ModelPoint model, std::vector<Coordinate> coordinates, const Weights& weights,
+       unsigned chains)
+      : predictor_(predictor), model_(std::move(model)), coordinates_(std::move(coordinates)), chains_(chains),
+        rows_(rows_of(predictor.data(), chains)) {
+    set_num_residuals(static_cast<int>(rows_.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(coordinates_.size()));
+    weight_.resize(static_cast<Eigen::Index>(rows_.size()));
+    for (std::size_t i = 0; i < rows_.size(); ++i)
+      weight_[static_cast<Eigen::Index>(i)] =
+          1 / weights.sigma[static_cast<int>(predictor.data().rows[static_cast<std::size_t>(rows_[i])].chain)];
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    ModelPoint model = model_;
+    for (std::size_t j = 0; j < coordinates_.size(); ++j) set(model, coordinates_[j], parameters[0][j] * coordinates_[j].scale);
+    Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_.rows()));
+    predictor_.predict(model, chains_, here);
+    const Eigen::VectorXd& measured = predictor_.measured();
+    const std::size_t n = rows_.size(), m = coordinates_.size();
+    for (std::size_t i = 0; i < n; ++i)
+      residuals[i] = (here[rows_[i]] - measured[rows_[i]]) * weight_[static_cast<Eigen::Index>(i)];
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    Eigen::VectorXd column = here;
+    for (std::size_t j = 0; j < m; ++j) {
+      const Coordinate& c = coordinates_[j];
+      column = here;
+      differentiate(predictor_, model, here, c, parameters[0][j] * c.scale, column);
+      for (std::size_t i = 0; i < n; ++i) {
+        const bool touched = (bit(predictor_.data().rows[static_cast<std::size_t>(rows_[i])].chain) & c.chains) != 0;
+        jacobians[0][i * m + j] = touched ? column[rows_[i]] * weight_[static_cast<Eigen::Index>(i)] * c.scale : 0.0;
+      }
+    }
+    return true;
+  }
+
+ private:
+  const Predictor& predictor_;
+  ModelPoint model_;
+  std::vector<Coordinate> coordinates_;
+  unsigned chains_;
+  std::vector<Eigen::Index> rows_;
+  Eigen::VectorXd weight_;
+};
+
+void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int iterations) {
+  std::vector<double> x(fit.coordinates.size());
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    const Coordinate& c = fit.coordinates[j];
+    x[j] = std::clamp(fit.value(c), c.lower, c.upper) / c.scale;
+  }
+  ceres::Problem problem;
+  auto* cost = new Rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
+  problem.AddResidualBlock(cost, nullptr, x.data());
+  for (std::size_t j = 0; j < x.size(); ++j) {
+    const Coordinate& c = fit.coordinates[j];
+    problem.SetParameterLowerBound(x.data(), static_cast<int>(j), c.lower / c.scale);
+    problem.SetParameterUpperBound(x.data(), static_cast<int>(j), c.upper / c.scale);
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = iterations;
+  options.function_tolerance = 1e-8;
+  options.parameter_tolerance = 1e-7;
+  options.logging_type = ceres::SILENT;
+  options.num_threads = 1;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  fit.converged = summary.IsSolutionUsable();
+  for (std::size_t j = 0; j < x.size(); ++j) set(fit.model, fit.coordinates[j], x[j] * fit.coordinates[j].scale);
+  // The rows that were refitted; the others stay.
+  Eigen::VectorXd prediction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
+  predictor.predict(fit.model, fit.chains, prediction);
+  if (fit.residual.size() == 0) fit.residual = Eigen::VectorXd::Zero(prediction.size());
+  for (std::size_t i = 0; i < predictor.rows(); ++i) {
+    const Chain chain = predictor.data().rows[i].chain;
+    const auto k = static_cast<Eigen::Index>(i);
+    if ((bit(chain) & fit.chains) != 0)
+      fit.residual[k] = (prediction[k] - predictor.measured()[k]) / weights.sigma[static_cast<int>(chain)];
+  }
+  fit.loss = fit.residual.squaredNorm();
+}
+
+/// Chains that hang together with those given through a common parameter.
+unsigned closure(unsigned chains, const ModelPoint& model) {
+  if ((chains & kPressureChains) != 0) chains |= kPressureChains;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const Active& a : model.effects) {
+      const unsigned c = a.hypothesis->chains;
+      if ((c & chains) != 0 && (c & ~chains) != 0) {
+        chains |= c;
+        grown = true;
+      }
+    }
+    if ((chains & kPressureChains) != 0) chains |= kPressureChains;
+  }
+  return chains;
+}
+
+}  // namespace
+
+double Fit::value(const Coordinate& c) const {
+  return c.base >= 0 ? model.base[static_cast<std::size_t>(c.base)]
+                     : model.effects[static_cast<std::size_t>(c.effect)].values[static_cast<std::size_t>(c.component)];
+}
+
+Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances, const Weights& weights) {
+  Fit fit;
+  for (const BaseParameter& b : predictor.base()) fit.model.base.push_back(b.start);
+  for (const Hypothesis& h : tolerances) {
+    Active a;
+    a.hypothesis = &h;
+    fit.model.effects.push_back(a);
+  }
+  fit.tolerances = tolerances.size();
+  add_base(predictor, fit.model, kAllChains, fit.coordinates);
+  for (std::size_t i = 0; i < tolerances.size(); ++i)
+    fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
+  solve(predictor, fit, weights, 30);
+  return fit;
+}
+
+Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects, const Weights& weights,
+          int iterations) {
+  Fit fit;
+  fit.model = start.model;
+  fit.tolerances = start.tolerances;
+  fit.residual = start.residual;
+  unsigned chains = 0;
+  for (const Active& a : effects) {
+    // An effect that is also a tolerance takes its place.
+    for (std::size_t i = 0; i < fit.tolerances; ++i)
+      if (fit.model.effects[i].hypothesis->effect == a.hypothesis->effect) fit.model.effects[i].values = {};
+    fit.model.effects.push_back(a);
+    chains |= a.hypothesis->chains;
+  }
+  fit.chains = closure(chains, fit.model);
+  add_base(predictor, fit.model, fit.chains, fit.coordinates);
+  for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
+    const Active& a = fit.model.effects[i];
+    if ((a.hypothesis->chains & fit.chains) == 0) continue;
+    const bool tolerance = i < fit.tolerances;
+    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances), fit.model.effects.end(),
+                                 [&](const Active& other) { return other.hypothesis->effect == a.hypothesis->effect; }))
+      continue;
+    for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
+      if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
+        fit.coordinates.push_back(effect_coordinate(a, static_cast<int>(i), p, tolerance));
+  }
+  solve(predictor, fit, weights, iterations);
+  return fit;
+}
+
+Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const Weights& weights,
+                              std::vector<Coordinate>* used) {
+  // All chains, also those that the last refit left alone.
+  std::vector<Coordinate> all;
+  add_base(predictor, fit.model, kAllChains, all);
+  for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
+    const Active& a = fit.model.effects[i];
+    const bool tolerance = i < fit.tolerances;
+    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances), fit.model.effects.end(),
+                                 [&](const Active& other) { return other.hypothesis->effect == a.hypothesis->effect; }))
+      continue;
+    for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
+      if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
+        all.push_back(effect_coordinate(a, static_cast<int>(i), p, tolerance));
+  }
+  const auto n = static_cast<Eigen::Index>(predictor.rows());
+  Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
+  predictor.predict(fit.model, kAllChains, here);
+  Eigen::MatrixXd out(n, static_cast<Eigen::Index>(all.size()));
+  Eigen::Index columns = 0;
+  for (const Coordinate& c : all) {
+    const double value = fit.value(c), margin = 1e-3 * (c.upper - c.lower);
+    if (c.base < 0 && (value < c.lower + (c.tolerance ? margin : 0) || value > c.upper - (c.tolerance ? margin : 0))) continue;
+    Eigen::VectorXd column = here;
+    differentiate(predictor, fit.model, here, c, value, column);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Chain chain = predictor.data().rows[static_cast<std::size_t>(i)].chain;
+      out(i, columns) = (bit(chain) & c.chains) != 0 ? column[i] * c.scale / weights.sigma[static_cast<int>(chain)] : 0.0;
+    }
+    ++columns;
+    if (used != nullptr) used->push_back(c);
+  }
+  out.conservativeResize(n, columns);
+  return out;
+}
+
+Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here, const Active& effect,
+                         const Weights& weights) {
+  Eigen::VectorXd after = here;
+  ModelPoint with = fit.model;
+  with.effects.push_back(effect);
+  predictor.predict(with, effect.hypothesis->chains, after);
+  after -= here;
+  for (std::size_t i = 0; i < predictor.rows(); ++i)
+    after[static_cast<Eigen::Index>(i)] /= weights.sigma[static_cast<int>(predictor.data().rows[i].chain)];
+  return after;
+}
+
+}  // namespace isac::explain

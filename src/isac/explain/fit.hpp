@@ -1,0 +1,61 @@
+/// @file
+/// Joint refit of the baseline and any effects by Ceres, and the sensitivities that a fit leaves behind.
+///
+///   min Σ ((y_pred(θ) − y)/σ_chain)²,  θ = baseline, tolerances, effects, within bounds
+///
+/// Only the chains that the effects touch are refitted; rows of the others keep the residual of the fit it starts from.
+/// Derivatives are forward differences of the simulation, but for baseline terms, which are linear.
+/// Units: weighted rows. Threads: safe on separate arguments. Errors: none; `converged` says so.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "isac/explain/predict.hpp"
+
+namespace isac::explain {
+
+struct Weights {
+  double sigma[kChains] = {1, 1, 1, 1};  ///< of one low-passed row, N m or Pa
+};
+
+/// One fitted number of a model.
+struct Coordinate {
+  int base = -1;                    ///< index in the baseline, or −1
+  int effect = -1, component = -1;  ///< of model.effects, else −1
+  double lower = 0, upper = 0, scale = 1;
+  unsigned chains = 0;
+  bool tolerance = false;
+};
+
+struct Fit {
+  ModelPoint model;  ///< tolerances first among its effects
+  std::size_t tolerances = 0;
+  std::vector<Coordinate> coordinates;
+  Eigen::VectorXd residual;  ///< weighted, all rows: (prediction − measured)/σ
+  double loss = 0;           ///< ‖residual‖²
+  bool converged = false;
+  unsigned chains = kAllChains;  ///< that were refitted
+
+  [[nodiscard]] double value(const Coordinate& c) const;
+};
+
+/// The baseline alone, with its tolerances.
+[[nodiscard]] Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances,
+                               const Weights& weights);
+/// `start.model` with `effects` added at their values, all refitted together.
+[[nodiscard]] Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
+                        const Weights& weights, int iterations = 12);
+
+/// Weighted derivative of the rows by each coordinate that is inside its bounds; columns in the order of `coordinates`,
+/// `used` says which.
+[[nodiscard]] Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const Weights& weights,
+                                            std::vector<Coordinate>* used = nullptr);
+
+/// Weighted difference of the rows when an effect is added to the fit's model, nothing refitted. `here` is the model's own
+/// prediction of all rows.
+[[nodiscard]] Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
+                                       const Active& effect, const Weights& weights);
+
+}  // namespace isac::explain

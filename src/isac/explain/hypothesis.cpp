@@ -1,0 +1,338 @@
+#include "isac/explain/hypothesis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "isac/core/units.hpp"
+
+namespace isac::explain {
+namespace {
+
+using models::EffectInfo;
+using models::Hook;
+using models::Subsystem;
+using std::string_view;
+
+/// How far the data reaches: what shapes are worth a start.
+struct Reach {
+  double angle_low = 0, angle_high = 0, speed = 0, pressure_low = 0, pressure_high = 0, command_high = 0, rate = 0,
+         force = 0, run_seconds = 0, day_seconds = 0, interval = 0.002;
+};
+
+Reach reach_of(const Prepared& data) {
+  Reach reach;
+  reach.pressure_low = 1e12;
+  std::vector<double> rates;
+  for (const PreparedRun& run : data.runs) {
+    if (run.interval > 0) reach.interval = run.interval;
+    for (const double v : run.angle) {
+      reach.angle_low = std::min(reach.angle_low, v);
+      reach.angle_high = std::max(reach.angle_high, v);
+    }
+    for (const double w : run.velocity) reach.speed = std::max(reach.speed, std::abs(w));
+    for (const auto& p : run.pressure)
+      for (std::size_t k = 0; k < p.size(); ++k) {
+        reach.pressure_low = std::min(reach.pressure_low, p[k]);
+        reach.pressure_high = std::max(reach.pressure_high, p[k]);
+        if (k >= 5) reach.rate = std::max(reach.rate, std::abs(p[k] - p[k - 5]) / (5 * run.interval));
+      }
+    for (const auto& u : run.command)
+      for (const double v : u) reach.command_high = std::max(reach.command_high, v);
+    for (const auto& f : run.force)
+      for (const double v : f) reach.force = std::max(reach.force, v);
+    if (!run.time.empty()) {
+      reach.run_seconds = std::max(reach.run_seconds, run.time.back());
+      reach.day_seconds = std::max(reach.day_seconds, run.day_offset + run.time.back());
+    }
+  }
+  return reach;
+}
+
+/// Grids of the shape parameters; `at` counts the parameter within its effect.
+std::vector<double> grid_of(string_view id, int at, const Reach& r) {
+  const double bar = kPascalPerKgfCm2;
+  if (id == "stribeck_friction" && at == 2) return {0.03, 0.1, 0.3};
+  if (id == "pressure_dependent_friction" && at == 1) return {1.0};
+  if (id == "hysteresis" && at == 1) return {0.01, 0.04, 0.15};
+  if (id == "asymmetric_hysteresis" && at >= 2) return {0.04};
+  if (id == "creep" && at == 1) return {1, 4, 15, 60, 250};
+  if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
+  if (id == "series_elasticity" && at == 1) return {9, 15, 25, 40};
+  if (id == "series_elasticity" && at == 2) return {0.05};
+  if (id == "backlash" && at == 0) return {0.003, 0.015};
+  if (id == "encoder_play" && at == 0) return {0.001, 0.004};
+  if (id == "tension_loss" && at == 1) {
+    const double far = std::max(r.angle_high, -r.angle_low);
+    return {0.4 * far, 0.65 * far, 0.85 * far};
+  }
+  if (id == "end_stop" && at == 1)
+    return {0.55 * r.angle_high, 0.8 * r.angle_high, 0.93 * r.angle_high, 3.0};
+  if (id == "end_stop" && at == 2) return {0.55 * r.angle_low, 0.8 * r.angle_low, 0.93 * r.angle_low, -3.0};
+  if (id == "torque_ripple" && at == 2) {
+    std::vector<double> grid;
+    const double step = 0.6 * kPi / std::max(0.1, r.angle_high - r.angle_low);
+    for (double n = 6; n < 70; n += step) grid.push_back(n);
+    return grid;
+  }
+  if (id == "flow_limit" && at == 0) return {0.35 * r.rate, 0.6 * r.rate, 0.85 * r.rate};
+  if (id == "force_saturation" && at == 0) return {0.75 * r.force, 0.88 * r.force, 0.97 * r.force};
+  if (id == "supply_droop" && at == 0) return {0.75 * r.command_high, 0.9 * r.command_high, 1.05 * r.command_high};
+  if (id == "supply_droop" && at == 1) return {0.0, 0.3};
+  if (id == "supply_droop" && at == 2) return {1.0};
+  if (id == "threshold_pressure" && at == 0) {
+    const double low = std::max(0.1 * bar, r.pressure_low);
+    return {0.5 * low, 1.3 * low};
+  }
+  if (id == "dead_time" && at == 0) return {0.006, 0.02};
+  if (id == "second_order_lag" && at == 0) return {0.006, 0.03};
+  if (id == "sensor_lag" && at == 0) return {0.003, 0.015};
+  if (id == "valve_deadband" && at == 0) return {0.01 * bar, 0.05 * bar};
+  if (id == "valve_hysteresis" && at == 0) return {0.01 * bar, 0.05 * bar};
+  if (id == "asymmetric_fill_vent" && at == 0) return {0.9, 1.15};
+  return {};
+}
+
+std::vector<Values> shapes_of(const EffectInfo& info, const Reach& reach) {
+  std::vector<Values> shapes(1);
+  for (int i = 0; i < info.parameter_count; ++i) {
+    const auto& parameter = info.parameters[i];
+    std::vector<double> grid = grid_of(info.id, i, reach);
+    if (grid.empty()) grid = {parameter.typical};
+    std::vector<Values> more;
+    for (const Values& shape : shapes)
+      for (const double value : grid) {
+        Values next = shape;
+        next[static_cast<std::size_t>(i)] = std::clamp(value, parameter.lower, parameter.upper);
+        more.push_back(next);
+      }
+    shapes = std::move(more);
+  }
+  // A stop with both sides out of reach is none.
+  std::erase_if(shapes, [&](const Values& s) { return string_view(info.id) == "end_stop" && s[1] > 2.9 && s[2] < -2.9; });
+  return shapes;
+}
+
+bool jumps_with_direction(int effect, const EffectInfo& info) {
+  if (info.hook != Hook::kTorque) return false;
+  if (info.state_count > 0) return info.state_count == 1 && string_view(info.id) != "creep";
+  models::JointPoint<double> x;
+  x.angle = 0.3;
+  x.mean_pressure = x.reference_pressure = 3e5;
+  Values q{};
+  for (int i = 0; i < info.parameter_count; ++i) q[static_cast<std::size_t>(i)] = info.parameters[i].typical;
+  x.velocity = 1e-9;
+  const double up = models::effect_torque(effect, q.data(), x);
+  x.velocity = -1e-9;
+  return std::abs(up - models::effect_torque(effect, q.data(), x)) > 1e-6;
+}
+
+/// Which of angle, forces, pressures a reading effect changes, asked of its equation.
+struct Touches {
+  bool angle = false, force = false, pressure = false;
+};
+
+Touches touches(int effect, const EffectInfo& info) {
+  Touches t;
+  if (info.hook == Hook::kDelay) {
+    t.angle = info.where == Subsystem::kSensor;
+    return t;
+  }
+  if (info.hook == Hook::kOutlier) {
+    t.force = true;
+    return t;
+  }
+  Values q{};
+  for (int i = 0; i < info.parameter_count; ++i) q[static_cast<std::size_t>(i)] = info.parameters[i].typical;
+  models::Readings<double> y{{200, 300}, {3e5, 4e5}, 0.4};
+  const models::Readings<double> before = y;
+  const double z[2] = {0.1, 0.2};
+  models::effect_reading(effect, q.data(), 20.3, z, y);
+  t.angle = y.angle != before.angle;
+  t.force = y.force[0] != before.force[0] || y.force[1] != before.force[1];
+  t.pressure = y.pressure[0] != before.pressure[0] || y.pressure[1] != before.pressure[1];
+  return t;
+}
+
+unsigned chains_of(const Hypothesis& h) {
+  const EffectInfo& info = h.info();
+  switch (info.hook) {
+    case Hook::kTorque:
+      return h.seen_by == SeenBy::kForceSensors ? bit(Chain::kTorque) : bit(Chain::kMotion);
+    case Hook::kCommand:
+    case Hook::kPressureRate:
+      return kPressureChains;
+    case Hook::kMusclePressure:
+      return bit(Chain::kTorque);
+    case Hook::kDelay:
+      return info.where == Subsystem::kPcu ? kPressureChains : kForceChains;
+    case Hook::kReading:
+    case Hook::kOutlier:
+      return (h.reads_angle || h.reads_force ? kForceChains : 0U) |
+             (h.reads_pressure ? bit(Chain::kTorque) | kPressureChains : 0U);
+  }
+  return 0;
+}
+
+Hypothesis make_hypothesis(int effect, const Reach& reach) {
+  Hypothesis h;
+  h.effect = effect;
+  const EffectInfo& info = h.info();
+  h.shapes = shapes_of(info, reach);
+  for (int i = 0; i < info.parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    h.lower[k] = info.parameters[i].lower;
+    h.upper[k] = info.parameters[i].upper;
+    h.free[k] = true;
+    h.amplitude[k] = std::isfinite(info.parameters[i].null_value);
+  }
+  h.dry = jumps_with_direction(effect, info);
+  if (info.hook == Hook::kReading || info.hook == Hook::kDelay || info.hook == Hook::kOutlier) {
+    const Touches t = touches(effect, info);
+    h.reads_angle = t.angle;
+    h.reads_force = t.force;
+    h.reads_pressure = t.pressure;
+  }
+  h.seen_by = info.where == Subsystem::kMuscle ? SeenBy::kForceSensors : SeenBy::kMotionOnly;
+  h.chains = chains_of(h);
+  return h;
+}
+
+bool one_of(string_view id, std::initializer_list<string_view> ids) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+unsigned chains_in(const Prepared& data) {
+  unsigned chains = 0;
+  for (const Row& row : data.rows) chains |= bit(row.chain);
+  return chains;
+}
+
+}  // namespace
+
+int Hypothesis::parameters() const noexcept {
+  return static_cast<int>(std::count(free.begin(), free.end(), true));
+}
+
+Values null_values(const Hypothesis& hypothesis, const Values& shape) {
+  Values values = shape;
+  const EffectInfo& info = hypothesis.info();
+  for (int i = 0; i < info.parameter_count; ++i)
+    if (!std::isnan(info.parameters[i].null_value)) values[static_cast<std::size_t>(i)] = info.parameters[i].null_value;
+  return values;
+}
+
+Library make_library(const Prepared& data, const std::vector<std::string>& excluded) {
+  Library library;
+  const Reach reach = reach_of(data);
+  const unsigned there = chains_in(data);
+  const bool seed = data.baseline.terms.empty();
+  const auto catalogue = models::effect_catalogue();
+  const auto is_excluded = [&](const char* id) {
+    return std::find(excluded.begin(), excluded.end(), id) != excluded.end();
+  };
+  const auto in_baseline = [&](const char* id) {
+    if (seed) return one_of(id, {"stiffness", "pressure", "cubic_damping", "viscous_damping", "inertia", "offset"});
+    return std::any_of(data.baseline.terms.begin(), data.baseline.terms.end(),
+                       [&](const std::string& term) { return models::find_effect(term) == models::find_effect(id); });
+  };
+  for (int e = 0; e < static_cast<int>(catalogue.size()); ++e) {
+    const EffectInfo& info = catalogue[static_cast<unsigned>(e)];
+    const string_view id = info.id;
+    if (in_baseline(info.id) || is_excluded(info.id) || info.hook == Hook::kOutlier) continue;
+    if (one_of(id, {"mains_hum", "periodic_disturbance"})) continue;  // found by their spectrum (spectrum.hpp)
+    if (!seed) {
+      // A sum of terms has no forces, pressures or motion of its own: torques on the output, and the angle's sensor.
+      if (info.hook != Hook::kTorque && !touches(e, info).angle) continue;
+      if (one_of(id, {"offset", "inertia_error", "bearing_friction", "stiffness", "pressure", "backlash",
+                      "lever_arm_variation", "muscle_asymmetry", "pressure_dependent_stiffness",
+                      "quadratic_pressure_angle", "nonlinear_pressure_gain", "pressure_dependent_damping",
+                      "pressure_dependent_friction"}))
+        continue;
+      if (id == "torque_offset" && in_baseline("offset")) continue;
+      if (id == "encoder_offset" || id == "encoder_gain") continue;  // nothing says where the zero is
+    }
+    Hypothesis h = make_hypothesis(e, reach);
+    if (!seed) {
+      h.seen_by = SeenBy::kForceSensors;
+      h.chains = bit(Chain::kTorque);
+      if (id == "thermal_drift") h.free[1] = false;
+    }
+    if ((h.chains & there) == 0) {
+      library.not_testable.push_back(info.id);
+      continue;
+    }
+    library.hypotheses.push_back(h);
+    const auto also = [&](auto change) {
+      Hypothesis other = h;
+      change(other);
+      if ((other.chains & there) != 0) library.hypotheses.push_back(other);
+    };
+    if (!seed) continue;
+    if (one_of(id, {"backlash", "end_stop"}))
+      also([](Hypothesis& o) { o.seen_by = SeenBy::kForceSensors, o.chains = bit(Chain::kTorque); });
+    if (one_of(id, {"stribeck_friction", "hysteresis"}))
+      also([](Hypothesis& o) { o.seen_by = SeenBy::kMotionOnly, o.chains = bit(Chain::kMotion); });
+    if (one_of(id, {"thermal_drift", "force_drift", "encoder_drift"}) && reach.day_seconds > 1.5 * reach.run_seconds)
+      also([](Hypothesis& o) { o.clock = Clock::kDay; });
+  }
+
+  const auto tolerate = [&](const char* id, double low, double high) {
+    Hypothesis h = make_hypothesis(models::find_effect(id), reach);
+    h.lower[0] = low;
+    h.upper[0] = high;
+    h.shapes.resize(1);
+    h.shapes[0][0] = 0.5 * high;
+    if ((h.chains & there) != 0) library.tolerances.push_back(h);
+  };
+  if (std::isfinite(data.rig.angle_step) && seed) {
+    tolerate("encoder_offset", -0.5 * data.rig.angle_step, 0.5 * data.rig.angle_step);
+  }
+  if (seed) {
+    tolerate("time_skew", -0.5 * reach.interval, 0.5 * reach.interval);
+    tolerate("dead_time", -reach.interval, reach.interval);
+  }
+  return library;
+}
+
+const char* family_of(int effect) noexcept {
+  const auto catalogue = models::effect_catalogue();
+  if (effect < 0 || effect >= static_cast<int>(catalogue.size())) return "";
+  const string_view id = catalogue[static_cast<unsigned>(effect)].id;
+  if (one_of(id, {"coulomb_friction", "stribeck_friction", "pressure_dependent_friction", "hysteresis",
+                  "asymmetric_hysteresis", "bearing_friction", "backlash", "encoder_play"}))
+    return "rate-independent dissipation";
+  if (one_of(id, {"viscous_damping", "cubic_damping", "quadratic_damping", "pressure_dependent_damping"}))
+    return "viscous damping";
+  if (one_of(id, {"cubic_stiffness", "pressure_dependent_stiffness", "quadratic_pressure_angle", "tension_loss",
+                  "end_stop", "lever_arm_variation", "torque_ripple", "nonlinear_pressure_gain"}))
+    return "elasticity and geometry";
+  if (one_of(id, {"threshold_pressure"})) return "muscle at low pressure";
+  if (one_of(id, {"dead_time", "second_order_lag", "sensor_lag", "time_skew", "series_elasticity"}))
+    return "delay and lag";
+  if (one_of(id, {"asymmetric_fill_vent", "flow_limit", "valve_deadband", "valve_hysteresis", "supply_droop"}))
+    return "nonlinear valve";
+  if (one_of(id, {"creep", "thermal_drift", "force_drift", "encoder_drift"})) return "slow change";
+  if (one_of(id, {"torque_offset", "muscle_asymmetry", "force_offset", "encoder_offset", "pressure_offset",
+                  "pressure_gain_error", "pressure_sensor_gain", "force_gain_error", "encoder_gain", "offset"}))
+    return "calibration";
+  return "something else that moves";
+}
+
+bool nests(const std::string& general, const std::string& simple) noexcept {
+  static constexpr const char* kPairs[][2] = {
+      {"stribeck_friction", "coulomb_friction"},      {"pressure_dependent_friction", "coulomb_friction"},
+      {"hysteresis", "coulomb_friction"},             {"asymmetric_hysteresis", "hysteresis"},
+      {"asymmetric_hysteresis", "coulomb_friction"},  {"thermal_drift", "torque_offset"},
+      {"gravity_imbalance", "torque_offset"},         {"force_offset", "torque_offset"},
+      {"pressure_offset", "torque_offset"},           {"force_gain_error", "force_offset"},
+      {"lever_arm_variation", "quadratic_pressure_angle"}, {"stribeck_friction", "bearing_friction"},
+      {"hysteresis", "bearing_friction"},             {"supply_droop", "pressure_gain_error"},
+      {"series_elasticity", "inertia_error"},         {"end_stop", "tension_loss"}};
+  return std::any_of(std::begin(kPairs), std::end(kPairs), [&](const auto& pair) {
+    return general == pair[0] && simple == pair[1];
+  });
+}
+
+}  // namespace isac::explain

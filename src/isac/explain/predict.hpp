@@ -1,0 +1,76 @@
+/// @file
+/// The residual of a whole dataset for a model: baseline, tolerances and any effects of the catalogue.
+///
+///   torque      T_read = S[ T(φ, φ̇, p1, p2) ]                       every run with forces
+///   pressure    p_read = S[ p(t) ],  T_C ṗ = K_C u − p              every run with commands, simulated from them
+///   motion      T_read = S[ I φ̈ − T_joint ]                         runs in which the joint moves freely
+///
+/// S is what sensors do to a reading. Effects on readings of angle and pressure are undone in the measured signal before it
+/// enters an equation; those on forces and pressures that are predicted are done to the prediction. Effects with states are
+/// integrated along the measured motion. At its null value every effect leaves every row bit for bit.
+/// Rows are low-passed with the kernel of their chain; weights are the caller's.
+/// Units: SI. Threads: const members may be called from many threads at once. Errors: none; NaN where a model breaks down.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "isac/explain/hypothesis.hpp"
+#include "isac/explain/prepared.hpp"
+
+namespace isac::explain {
+
+/// The baseline's parameters: terms of the output first, then K_C and T_C where the valve unit is in the data.
+struct BaseParameter {
+  std::string name, unit;
+  double si_per_unit = 1;
+  double start = 0, lower = 0, upper = 0;
+  unsigned chains = 0;
+};
+
+struct ModelPoint {
+  std::vector<double> base;
+  std::vector<Active> effects;  ///< tolerances among them
+};
+
+class Predictor {
+ public:
+  explicit Predictor(const Prepared& data);
+
+  [[nodiscard]] const std::vector<BaseParameter>& base() const noexcept { return base_; }
+  [[nodiscard]] const Prepared& data() const noexcept { return *data_; }
+  [[nodiscard]] std::size_t rows() const noexcept { return data_->rows.size(); }
+  /// What was measured, low-passed: the residual's other half.
+  [[nodiscard]] const Eigen::VectorXd& measured() const noexcept { return measured_; }
+  /// Predictions of the rows of one run that belong to the chains asked for; other rows of `out` stay as they are.
+  void predict_run(const ModelPoint& model, std::size_t run, unsigned chains, Eigen::VectorXd& out) const;
+  void predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const;
+  /// The prediction at the recording's rate, for pictures and for floors: torque (and pressures) of one run.
+  struct FullRate {
+    std::vector<double> torque, pressure[2], motion;
+  };
+  [[nodiscard]] FullRate full_rate(const ModelPoint& model, std::size_t run) const;
+
+ private:
+  struct Inputs;
+  Inputs inputs_of(const ModelPoint& model, const PreparedRun& run) const;
+  std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
+                                        bool motion) const;
+  double base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const;
+  void pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
+                    std::vector<double> (&p)[2]) const;
+  void read_forces(const ModelPoint& model, const PreparedRun& run, const std::vector<double>& torque,
+                   std::vector<double>& change) const;
+
+  const Prepared* data_;
+  std::vector<BaseParameter> base_;
+  std::vector<int> terms_;         ///< catalogue indices of the output's terms
+  std::vector<double> term_sign_;  ///< −1 for a driven axis
+  int gain_ = -1, lag_ = -1;       ///< positions of K_C, T_C in base
+  int stiffness_ = -1, pressure_gain_ = -1;
+  Eigen::VectorXd measured_;
+};
+
+}  // namespace isac::explain

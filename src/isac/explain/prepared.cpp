@@ -1,0 +1,292 @@
+#include "isac/explain/prepared.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <map>
+#include <utility>
+
+#include "isac/core/error.hpp"
+#include "isac/core/units.hpp"
+#include "isac/series/derive.hpp"
+#include "isac/series/differentiate.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kKernelReach = 4.0;      // standard deviations
+constexpr double kRowRate = 125;          // Hz: beyond it the kernel has left nothing
+constexpr double kSlowestStep = 0.05;     // s per encoder step: slower is standing still
+constexpr double kWideKernel = 0.020;     // s, for velocities that the encoder resolves badly
+constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
+
+std::vector<double> gaussian(double sigma, int order) {
+  const int reach = std::max(1, static_cast<int>(std::ceil(kKernelReach * sigma)));
+  std::vector<double> g(static_cast<std::size_t>(2 * reach + 1));
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k) sum += g[static_cast<std::size_t>(k + reach)] = std::exp(-0.5 * k * k / (sigma * sigma));
+  for (double& v : g) v /= sum;
+  if (order == 0) return g;
+  // Derivatives that are exact on the polynomials they must be exact on, whatever the truncation.
+  std::vector<double> d(g.size());
+  double moment = 0, second = 0;
+  for (int k = -reach; k <= reach; ++k) {
+    const double v = g[static_cast<std::size_t>(k + reach)];
+    second += k * k * v;
+  }
+  for (int k = -reach; k <= reach; ++k) {
+    const auto i = static_cast<std::size_t>(k + reach);
+    if (order == 1) {
+      d[i] = g[i] * k;
+      moment += d[i] * k;
+    } else {
+      d[i] = g[i] * (k * k - second);
+      moment += d[i] * 0.5 * k * k;
+    }
+  }
+  for (double& v : d) v /= moment;
+  return d;
+}
+
+double parse_iso8601(const std::string& text) {
+  std::tm tm{};
+  double seconds = 0;
+  if (std::sscanf(text.c_str(), "%d-%d-%dT%d:%d:%lf", &tm.tm_year, &tm.tm_mon, &tm.tm_mday, &tm.tm_hour,
+                  &tm.tm_min, &seconds) != 6)
+    return std::nan("");
+  tm.tm_year -= 1900;
+  tm.tm_mon -= 1;
+  return static_cast<double>(timegm(&tm)) + seconds;
+}
+
+/// Values on the even grid; short gaps are bridged and marked.
+std::vector<double> on_grid(const std::vector<double>& time, const std::vector<double>& x,
+                            const std::vector<double>& grid, std::vector<unsigned char>* usable) {
+  std::vector<double> out(grid.size(), std::nan(""));
+  std::size_t i = 0;
+  std::vector<std::size_t> known;
+  known.reserve(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k)
+    if (std::isfinite(x[k])) known.push_back(k);
+  if (known.size() < 2) return {};
+  const double interval = grid.size() > 1 ? grid[1] - grid[0] : 1;
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    const double t = grid[k];
+    while (i + 2 < known.size() && time[known[i + 1]] < t) ++i;
+    const double t0 = time[known[i]], t1 = time[known[i + 1]];
+    const double share = std::clamp((t - t0) / (t1 - t0), 0.0, 1.0);
+    out[k] = (1 - share) * x[known[i]] + share * x[known[i + 1]];
+    if (usable != nullptr && t1 - t0 > 2.5 * interval) (*usable)[k] = 0;
+  }
+  return out;
+}
+
+const std::vector<double>* values_of(const series::Recording& run, const char* name) {
+  const series::Column* column = run.find(name);
+  return column == nullptr ? nullptr : &column->values;
+}
+
+PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig, const BaselineModel& baseline,
+                        const Smoothing& smoothing) {
+  PreparedRun run;
+  run.name = recording.source.substr(recording.source.find_last_of('/') + 1);
+  run.sha256 = recording.sha256;
+  run.experiment = recording.meta("experiment");
+  run.is_free = run.experiment == "free" || run.experiment == "closed-loop";
+  const std::vector<double>& time = recording.column("time").values;
+  if (time.size() < 100) return run;
+  const double dt = series::median_interval(time);
+  run.interval = dt;
+  const auto n = static_cast<std::size_t>(std::floor((time.back() - time.front()) / dt + 1.5));
+  if (n < 100 || n > 100 * time.size()) return run;
+  // A clock that keeps its step within a tenth of it needs no resampling.
+  bool even = n == time.size();
+  for (std::size_t k = 0; even && k < n; ++k)
+    even = std::abs(time[k] - time.front() - static_cast<double>(k) * dt) < 0.25 * dt;
+  run.time.resize(n);
+  for (std::size_t k = 0; k < n; ++k)
+    run.time[k] = even ? time[k] - time.front() : static_cast<double>(k) * dt;
+  std::vector<double> absolute(n);
+  for (std::size_t k = 0; k < n; ++k) absolute[k] = even ? time[k] : time.front() + run.time[k];
+  run.usable.assign(n, 1);
+  const auto take = [&](const char* name) -> std::vector<double> {
+    const std::vector<double>* x = values_of(recording, name);
+    if (x == nullptr) return {};
+    if (even && std::all_of(x->begin(), x->end(), [](double v) { return std::isfinite(v); })) return *x;
+    return on_grid(time, *x, absolute, &run.usable);
+  };
+  run.raw_angle = take(baseline.position.c_str());
+  const double sigma = smoothing.torque / dt;
+  if (!run.raw_angle.empty()) {
+    run.angle = low_pass(run.raw_angle, sigma);
+    run.velocity = low_pass_derivative(run.raw_angle, sigma, dt, 1);
+    run.acceleration = low_pass_derivative(run.raw_angle, sigma, dt, 2);
+    run.dry_velocity = dry_velocity(run.raw_angle, run.velocity, dt, rig.angle_step);
+  }
+  std::vector<double> p1 = take("p1"), p2 = take("p2");
+  if (!p1.empty() && !p2.empty()) {
+    run.has_pressure = true;
+    run.pressure[0] = low_pass(p1, sigma);
+    run.pressure[1] = low_pass(p2, sigma);
+  }
+  run.command[0] = take("p1_cmd");
+  run.command[1] = take("p2_cmd");
+  run.has_command = run.has_pressure && !run.command[0].empty() && !run.command[1].empty();
+  const bool joint = baseline.terms.empty() || baseline.output == "torque";
+  if (joint) {
+    run.force[0] = take("F1");
+    run.force[1] = take("F2");
+    if (run.force[0].empty() || run.force[1].empty()) run.force[0] = run.force[1] = {};
+  }
+  if (!run.force[0].empty() && std::isfinite(rig.wheel_radius)) {
+    run.torque = series::torque_from_forces(run.force[0], run.force[1], rig.wheel_radius);
+  } else {
+    run.torque = take(baseline.output.c_str());
+  }
+  run.has_torque = !run.torque.empty() && !run.angle.empty();
+  if (run.has_torque) {
+    run.smooth_torque = low_pass(run.torque, sigma);
+    if (run.is_free) {
+      run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
+      run.slow_acceleration = low_pass_derivative(run.raw_angle, smoothing.motion / dt, dt, 2);
+    }
+  }
+  // Rows beside gaps and edges see through the kernel what is not there.
+  const auto reach = static_cast<std::size_t>(std::ceil(kKernelReach * smoothing.motion / dt));
+  std::vector<unsigned char> usable = run.usable;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (run.usable[k] != 0 && k >= reach && k + reach < n) continue;
+    const std::size_t from = run.usable[k] != 0 ? k : k - std::min(k, reach);
+    const std::size_t to = run.usable[k] != 0 ? k + 1 : std::min(n, k + reach + 1);
+    for (std::size_t i = from; i < to; ++i) usable[i] = 0;
+  }
+  run.usable = std::move(usable);
+  return run;
+}
+
+void add_rows(Prepared& data) {
+  data.rows.clear();
+  data.run_begin.assign(1, 0);
+  const bool seed = data.baseline.terms.empty();
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const PreparedRun& run = data.runs[r];
+    const auto stride = static_cast<std::size_t>(data.stride);
+    const auto put = [&](Chain chain, bool there, double skip, std::size_t step) {
+      if (!there) return;
+      for (std::size_t k = 0; k < run.time.size(); k += step)
+        if (run.usable[k] != 0 && run.time[k] >= skip)
+          data.rows.push_back({.run = static_cast<unsigned>(r), .sample = static_cast<unsigned>(k), .block = 0, .chain = chain});
+    };
+    put(Chain::kTorque, run.has_torque && (!seed || run.has_pressure), 0, stride);
+    put(Chain::kPressure1, seed && run.has_command, kPressureSettling, 2 * stride);
+    put(Chain::kPressure2, seed && run.has_command, kPressureSettling, 2 * stride);
+    put(Chain::kMotion, seed && run.is_free && run.has_torque && std::isfinite(data.rig.inertia), 0, stride);
+    data.run_begin.push_back(data.rows.size());
+  }
+}
+
+}  // namespace
+
+bool Prepared::has(Chain chain) const noexcept {
+  return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.chain == chain; });
+}
+
+std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_t first, std::size_t stride) {
+  if (sigma < 0.3) sigma = 0.3;
+  const std::vector<double> g = gaussian(sigma, 0);
+  const auto reach = static_cast<std::ptrdiff_t>(g.size() / 2);
+  const auto n = static_cast<std::ptrdiff_t>(x.size());
+  std::vector<double> out;
+  out.reserve(x.size() / stride + 1);
+  for (auto i = static_cast<std::ptrdiff_t>(first); i < n; i += static_cast<std::ptrdiff_t>(stride)) {
+    double sum = 0;
+    if (i >= reach && i + reach < n) {
+      const double* p = x.data() + (i - reach);
+      for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
+    } else {
+      for (std::ptrdiff_t k = -reach; k <= reach; ++k)
+        sum += g[static_cast<std::size_t>(k + reach)] * x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
+    }
+    out.push_back(sum);
+  }
+  return out;
+}
+
+std::vector<double> low_pass_derivative(std::span<const double> x, double sigma, double interval, int order) {
+  const std::vector<double> g = gaussian(std::max(sigma, 1.0), order);
+  const auto reach = static_cast<std::ptrdiff_t>(g.size() / 2);
+  const auto n = static_cast<std::ptrdiff_t>(x.size());
+  const double scale = order == 1 ? 1 / interval : 1 / (interval * interval);
+  std::vector<double> out(x.size());
+  for (std::ptrdiff_t i = 0; i < n; ++i) {
+    double sum = 0;
+    if (i >= reach && i + reach < n) {
+      const double* p = x.data() + (i - reach);
+      for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
+    } else {
+      for (std::ptrdiff_t k = -reach; k <= reach; ++k)
+        sum += g[static_cast<std::size_t>(k + reach)] * x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
+    }
+    out[static_cast<std::size_t>(i)] = sum * scale;
+  }
+  return out;
+}
+
+std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity, double interval,
+                                 double angle_step) {
+  const std::vector<double> wide = low_pass_derivative(raw_angle, kWideKernel / interval, interval, 1);
+  const double still = std::isfinite(angle_step) && angle_step > 0 ? angle_step / kSlowestStep : 0.0;
+  std::vector<double> out(velocity.size());
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const double share = still > 0 ? std::clamp((std::abs(wide[k]) - 2 * still) / (4 * still), 0.0, 1.0) : 1.0;
+    const double w = share * velocity[k] + (1 - share) * wide[k];
+    out[k] = std::abs(w) > still ? w : 0.0;
+  }
+  return out;
+}
+
+void cut_blocks(Prepared& data, double block_seconds) {
+  data.block_seconds = block_seconds;
+  std::size_t block = 0;
+  for (std::size_t r = 0; r + 1 < data.run_begin.size(); ++r) {
+    const double duration = data.runs[r].time.empty() ? 0 : data.runs[r].time.back();
+    const auto count = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(duration / block_seconds)));
+    for (std::size_t i = data.run_begin[r]; i < data.run_begin[r + 1]; ++i) {
+      const double share = duration > 0 ? data.runs[r].time[data.rows[i].sample] / duration : 0;
+      data.rows[i].block = static_cast<unsigned>(
+          block + std::min(count - 1, static_cast<std::size_t>(share * static_cast<double>(count))));
+    }
+    if (data.run_begin[r + 1] > data.run_begin[r]) block += count;
+  }
+  data.blocks = block;
+}
+
+Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig, const BaselineModel& baseline,
+                 double block_seconds) {
+  Prepared data;
+  data.rig = rig;
+  data.baseline = baseline;
+  std::vector<double> started;
+  double rate = 0;
+  for (const series::Recording& recording : runs) {
+    data.runs.push_back(prepare_run(recording, rig, baseline, data.smoothing));
+    started.push_back(parse_iso8601(recording.meta("started")));
+    if (data.runs.back().interval > 0) rate = std::max(rate, 1 / data.runs.back().interval);
+  }
+  double first = std::numeric_limits<double>::infinity();
+  for (const double t : started)
+    if (std::isfinite(t)) first = std::min(first, t);
+  for (std::size_t r = 0; r < data.runs.size(); ++r)
+    data.runs[r].day_offset = std::isfinite(started[r]) ? started[r] - first : 0;
+  data.stride = std::max(1, static_cast<int>(std::floor(rate / kRowRate + 1e-6)));
+  add_rows(data);
+  if (data.rows.empty()) {
+    throw Error(ErrorKind::kAnswerIsNo, "no_usable_data",
+                "no run has what a comparison needs: angle with F1 and F2 (or torque) and p1, p2, or p1_cmd, p2_cmd "
+                "with p1, p2; record them with isac-log.");
+  }
+  cut_blocks(data, block_seconds);
+  return data;
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,115 @@
+/// @file
+/// A dataset made ready for explaining: every run on an even grid, low-passed once, cut into blocks of time.
+///
+///   x̃ = g ∗ x,  φ̇ = g′ ∗ φ,  φ̈ = g″ ∗ φ,   g a Gaussian of standard deviation `smooth`
+///
+/// All signals of a chain pass the same kernel, so that a linear model of them is left as it is. Velocity near zero is what an
+/// encoder of finite steps can tell: slower than one step in a tenth of a second is standing still (`dry_velocity`).
+/// Held-out runs are a type of their own (HeldOut): only the proof at the end can open them.
+/// Units: SI. Threads: values. Errors: throws isac::Error (no usable data) if no run has what any chain needs.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "isac/series/recording.hpp"
+
+namespace isac::explain {
+
+/// What is known of the rig beforehand; NaN where not.
+struct RigFacts {
+  double wheel_radius = std::numeric_limits<double>::quiet_NaN();  ///< m
+  double initial_pressure = 3.0 * 98066.5;                         ///< Pa, p0
+  double inertia = std::numeric_limits<double>::quiet_NaN();       ///< kg m²
+  double angle_step = std::numeric_limits<double>::quiet_NaN();    ///< rad of the encoder
+  double force_lag = std::numeric_limits<double>::quiet_NaN();     ///< s, of the force amplifiers
+  double force_noise = std::numeric_limits<double>::quiet_NaN();   ///< N, data sheet
+  double pressure_noise = std::numeric_limits<double>::quiet_NaN();  ///< Pa, data sheet
+};
+
+/// The baseline: the seed's joint (no terms given), or a sum of catalogue terms that makes a recorded output.
+struct BaselineModel {
+  std::vector<std::string> terms;  ///< ids; empty: A, B, C, D, the valve unit's lag and I φ̈ = T
+  std::string output = "torque", output_unit = "N m";
+  std::string position = "angle", position_unit = "rad";
+  /// The output drives the axis: output = −Σ term (constants of the output keep their sign).
+  bool driven = false;
+};
+
+enum class Chain : unsigned char { kTorque = 0, kPressure1 = 1, kPressure2 = 2, kMotion = 3 };
+inline constexpr int kChains = 4;
+
+struct PreparedRun {
+  std::string name, experiment, sha256;
+  double interval = 0;    ///< s
+  double day_offset = 0;  ///< s from the first run's start to this one's
+  bool has_torque = false, has_pressure = false, has_command = false, is_free = false;
+  std::vector<double> time;             ///< s
+  std::vector<double> raw_angle;        ///< rad as read
+  std::vector<double> angle, velocity, acceleration;  ///< low-passed
+  std::vector<double> dry_velocity;     ///< velocity that an encoder can tell from standing still
+  std::vector<double> pressure[2];      ///< Pa, low-passed
+  std::vector<double> command[2];       ///< Pa as recorded
+  std::vector<double> force[2];         ///< N as read; empty where only the torque is known
+  std::vector<double> torque;           ///< N m (or the output's unit) as read
+  std::vector<double> smooth_torque;    ///< low-passed for the torque chain
+  std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
+  std::vector<unsigned char> usable;    ///< 0 beside gaps and edges
+};
+
+/// One row of the stacked residual.
+struct Row {
+  unsigned run = 0, sample = 0, block = 0;
+  Chain chain = Chain::kTorque;
+};
+
+struct Smoothing {
+  double torque = 0.006, motion = 0.012;  ///< s, standard deviation of the Gaussian
+};
+
+struct Prepared {
+  RigFacts rig;
+  BaselineModel baseline;
+  Smoothing smoothing;
+  std::vector<PreparedRun> runs;
+  std::vector<Row> rows;        ///< by run, then by chain, then by time
+  std::vector<std::size_t> run_begin;  ///< rows of run i: [run_begin[i], run_begin[i + 1])
+  std::size_t blocks = 0;
+  double block_seconds = 0;
+  int stride = 1;  ///< samples per row
+
+  [[nodiscard]] bool has(Chain chain) const noexcept;
+};
+
+/// Runs that no fit, test or choice has seen. Only prove() (proof.hpp) opens them.
+class HeldOut {
+ public:
+  HeldOut() = default;
+  explicit HeldOut(std::vector<series::Recording> runs) : runs_(std::move(runs)) {}
+  [[nodiscard]] std::size_t size() const noexcept { return runs_.size(); }
+
+ private:
+  friend class Proof;
+  std::vector<series::Recording> runs_;
+};
+
+[[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
+                               const BaselineModel& baseline, double block_seconds);
+/// Cuts the rows into blocks anew.
+void cut_blocks(Prepared& data, double block_seconds);
+
+/// g ∗ x at the samples asked for (every `stride`-th from `first`); the ends are continued by their last value.
+[[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples, std::size_t first = 0,
+                                           std::size_t stride = 1);
+/// (g′ ∗ x)/Δt and (g″ ∗ x)/Δt².
+[[nodiscard]] std::vector<double> low_pass_derivative(std::span<const double> x, double sigma_samples,
+                                                      double interval, int order);
+/// Velocity that can be told from standing still; see the head of this file.
+[[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity,
+                                               double interval, double angle_step);
+
+}  // namespace isac::explain

@@ -1,0 +1,49 @@
+/// @file
+/// The proof: the gap before and after on runs that no fit, test or choice has seen, against the noise floor and the model
+/// that says nothing moves.
+///
+/// This is the only place that opens HeldOut. Parameters stay as they were fitted. Residuals are at the recording's rate, raw.
+/// Units: the signal's. Threads: pure. Errors: none; runs that cannot be compared are left out.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isac/explain/explanation.hpp"
+#include "isac/explain/fit.hpp"
+
+namespace isac::explain {
+
+/// Sums of squares of one signal over runs, at the recording's rate.
+struct Sums {
+  double squares = 0, signal_squares = 0;
+  std::size_t samples = 0;
+  [[nodiscard]] double rms() const;
+  [[nodiscard]] double signal_rms() const;
+};
+
+/// rms of the raw residual of one chain over all runs of a dataset.
+[[nodiscard]] Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain chain);
+
+/// Columns for the pictures.
+[[nodiscard]] std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before, const ModelPoint& after,
+                                              Chain chain, bool heldout, std::size_t most_points);
+
+class Proof {
+ public:
+  /// Held-out runs prepared with the rig and baseline of the fitted ones; empty if none can be used.
+  Proof(const HeldOut& heldout, const Prepared& fitted);
+  [[nodiscard]] std::size_t runs() const noexcept { return count_; }
+  [[nodiscard]] Sums residual(const ModelPoint& model, Chain chain) const;
+  [[nodiscard]] std::vector<RunTrace> traces(const ModelPoint& before, const ModelPoint& after, Chain chain,
+                                             std::size_t most_points) const;
+
+ private:
+  std::optional<Prepared> data_;
+  std::optional<Predictor> predictor_;
+  std::size_t count_ = 0;
+};
+
+}  // namespace isac::explain

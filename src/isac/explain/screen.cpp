@@ -1,0 +1,271 @@
+#include "isac/explain/screen.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <random>
+#include <thread>
+
+#include "isac/series/statistics.hpp"
+
+namespace isac::explain {
+namespace {
+
+double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+
+/// Values with one amplitude at its start and the others absent; all of them if there is no choice.
+std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
+  std::vector<std::size_t> amplitudes;
+  for (int i = 0; i < h.info().parameter_count; ++i)
+    if (h.amplitude[static_cast<std::size_t>(i)] && h.free[static_cast<std::size_t>(i)]) amplitudes.push_back(static_cast<std::size_t>(i));
+  if (amplitudes.size() < 2) return {shape};
+  std::vector<Values> all;
+  for (const std::size_t keep : amplitudes) {
+    Values v = null_values(h, shape);
+    v[keep] = shape[keep];
+    all.push_back(v);
+  }
+  return all;
+}
+
+/// Least squares within signs: the best subset of columns whose amplitudes are allowed (at most four columns).
+struct SignedFit {
+  double gain = 0;
+  Eigen::VectorXd amplitude;
+};
+
+SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score, const std::vector<bool>& positive_only) {
+  const int n = static_cast<int>(score.size());
+  SignedFit best;
+  best.amplitude = Eigen::VectorXd::Zero(n);
+  for (int mask = 1; mask < (1 << n); ++mask) {
+    std::vector<int> use;
+    for (int i = 0; i < n; ++i)
+      if ((mask >> i & 1) != 0 && gram(i, i) > 0) use.push_back(i);
+    if (use.empty()) continue;
+    const auto k = static_cast<Eigen::Index>(use.size());
+    Eigen::MatrixXd g(k, k);
+    Eigen::VectorXd s(k);
+    for (Eigen::Index i = 0; i < k; ++i) {
+      s[i] = score[use[static_cast<std::size_t>(i)]];
+      for (Eigen::Index j = 0; j < k; ++j) g(i, j) = gram(use[static_cast<std::size_t>(i)], use[static_cast<std::size_t>(j)]);
+      g(i, i) *= 1 + 1e-6;
+    }
+    const Eigen::VectorXd a = g.ldlt().solve(s);
+    bool allowed = a.allFinite();
+    for (Eigen::Index i = 0; i < k && allowed; ++i)
+      allowed = !positive_only[static_cast<std::size_t>(use[static_cast<std::size_t>(i)])] || a[i] >= 0;
+    if (!allowed) continue;
+    const double gain = s.dot(a);
+    if (gain <= best.gain) continue;
+    best.gain = gain;
+    best.amplitude.setZero();
+    for (Eigen::Index i = 0; i < k; ++i) best.amplitude[use[static_cast<std::size_t>(i)]] = a[i];
+  }
+  return best;
+}
+
+struct Task {
+  int hypothesis, shape;
+};
+
+struct Done {
+  std::vector<Column> columns;
+  Screened screened;
+};
+
+}  // namespace
+
+Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
+  Eigen::MatrixXd scaled = sensitivities;
+  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
+    const double norm = scaled.col(j).norm();
+    if (norm > 0) scaled.col(j) /= norm;
+  }
+  // Gram–Schmidt twice: columns are few, and nearly dependent ones must fall away instead of becoming noise.
+  Eigen::MatrixXd q(scaled.rows(), scaled.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
+    Eigen::VectorXd v = scaled.col(j);
+    for (int round = 0; round < 2; ++round)
+      for (Eigen::Index k = 0; k < count; ++k) v -= q.col(k).dot(v) * q.col(k);
+    const double norm = v.norm();
+    if (norm > 1e-7) q.col(count++) = v / norm;
+  }
+  q.conservativeResize(scaled.rows(), count);
+  return q;
+}
+
+double flip_p_value(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double* statistic) {
+  const Eigen::Index blocks = scores.rows(), columns = scores.cols();
+  Eigen::MatrixXd scaled = scores;
+  for (Eigen::Index j = 0; j < columns; ++j) {
+    const double norm = scaled.col(j).norm();
+    if (norm > 0) scaled.col(j) /= norm;
+  }
+  const double observed = columns > 0 ? scaled.colwise().sum().cwiseAbs().maxCoeff() : 0.0;
+  if (statistic != nullptr) *statistic = observed;
+  std::mt19937_64 random(seed);
+  int reached = 1;
+  constexpr Eigen::Index kAtOnce = 128;
+  for (int done = 0; done < flips; done += kAtOnce) {
+    const Eigen::Index now = std::min<Eigen::Index>(kAtOnce, flips - done);
+    Eigen::MatrixXd signs(now, blocks);
+    for (Eigen::Index i = 0; i < now; ++i)
+      for (Eigen::Index b = 0; b < blocks; b += 64) {
+        std::uint64_t bits = random();
+        for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1) signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
+      }
+    const Eigen::VectorXd largest = (signs * scaled).cwiseAbs().rowwise().maxCoeff();
+    reached += static_cast<int>((largest.array() >= observed * (1 - 1e-12)).count());
+  }
+  return static_cast<double>(reached) / static_cast<double>(flips + 1);
+}
+
+Screen screen(const Predictor& predictor, const Fit& fit, const Library& library, const Weights& weights,
+              const ScreenOptions& options) {
+  const Prepared& data = predictor.data();
+  const auto n = static_cast<Eigen::Index>(predictor.rows());
+  const auto blocks = static_cast<Eigen::Index>(data.blocks);
+  const Eigen::MatrixXd q = basis_of(sensitivities(predictor, fit, weights));
+  Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
+  predictor.predict(fit.model, kAllChains, here);
+  const Eigen::VectorXd residual = fit.residual - q * (q.transpose() * fit.residual);
+
+  const auto summarise = [&](Eigen::VectorXd& x, Column& column) {
+    column.raw_norm2 = x.squaredNorm();
+    x -= q * (q.transpose() * x);
+    column.block_score = Eigen::VectorXd::Zero(blocks);
+    column.block_norm = Eigen::VectorXd::Zero(blocks);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].block);
+      column.block_score[b] -= x[i] * residual[i];  // prediction − measured: an effect that is missing has the other sign
+      column.block_norm[b] += x[i] * x[i];
+    }
+    column.norm2 = column.block_norm.sum();
+    if (column.norm2 < 1e-12 * std::max(column.raw_norm2, 1e-300)) {  // all of it is mimicked
+      column.block_score.setZero();
+      column.norm2 = 0;
+    }
+    column.score = column.block_score.sum();
+    const double scatter = column.block_score.norm();
+    column.T = scatter > 0 ? std::abs(column.score) / scatter : 0;
+  };
+
+  std::vector<Task> tasks;
+  for (std::size_t h = 0; h < library.hypotheses.size(); ++h)
+    for (std::size_t s = 0; s < library.hypotheses[h].shapes.size(); ++s)
+      tasks.push_back({static_cast<int>(h), static_cast<int>(s)});
+  std::vector<Done> done(tasks.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t t = next++; t < tasks.size(); t = next++) {
+      const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(tasks[t].hypothesis)];
+      const Values& shape = h.shapes[static_cast<std::size_t>(tasks[t].shape)];
+      const std::vector<Values> ways = directions(h, shape);
+      Eigen::MatrixXd x(n, static_cast<Eigen::Index>(ways.size()));
+      std::vector<bool> positive;
+      Done& result = done[t];
+      for (std::size_t a = 0; a < ways.size(); ++a) {
+        Eigen::VectorXd column = response(predictor, fit, here, {&h, ways[a]}, weights);
+        Column c;
+        c.hypothesis = tasks[t].hypothesis;
+        c.shape = tasks[t].shape;
+        c.amplitude = static_cast<int>(a);
+        if (!column.allFinite()) column.setZero();
+        summarise(column, c);
+        x.col(static_cast<Eigen::Index>(a)) = column;
+        result.columns.push_back(std::move(c));
+        // An amplitude that cannot change its sign: its bound is at its absence.
+        bool one_way = true;
+        for (int i = 0; i < h.info().parameter_count; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          if (!h.amplitude[k] || (ways.size() > 1 && ways[a][k] == h.info().parameters[i].null_value)) continue;
+          const double null = h.info().parameters[i].null_value;
+          if (h.lower[k] < null && h.upper[k] > null) one_way = false;
+        }
+        positive.push_back(one_way);
+      }
+      const auto m = static_cast<Eigen::Index>(ways.size());
+      Eigen::VectorXd score(m);
+      for (Eigen::Index a = 0; a < m; ++a) score[a] = result.columns[static_cast<std::size_t>(a)].score;
+      const Eigen::MatrixXd gram = x.transpose() * x;
+      const SignedFit linear = signed_fit(gram, score, positive);
+      Screened& s = result.screened;
+      s.hypothesis = tasks[t].hypothesis;
+      s.shape = tasks[t].shape;
+      s.gain = linear.gain;
+      s.start = null_values(h, shape);
+      for (std::size_t a = 0; a < ways.size(); ++a) {
+        s.reach = std::max(s.reach, std::sqrt(result.columns[a].norm2));
+        s.T = std::max(s.T, result.columns[a].T);
+        for (int i = 0; i < h.info().parameter_count; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          const double null = h.info().parameters[i].null_value;
+          if (!std::isfinite(null)) {
+            s.start[k] = shape[k];
+            continue;
+          }
+          if (ways.size() > 1 && ways[a][k] == null) continue;
+          const double factor = h.info().linear || h.info().hook == models::Hook::kTorque
+                                    ? std::clamp(linear.amplitude[static_cast<Eigen::Index>(a)], -50.0, 50.0)
+                                    : std::clamp(linear.amplitude[static_cast<Eigen::Index>(a)], -4.0, 4.0);
+          s.start[k] = std::clamp(null + factor * (shape[k] - null), h.lower[k], h.upper[k]);
+        }
+      }
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int i = 1; i < options.threads; ++i) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+
+  Screen result;
+  for (Done& d : done)
+    for (Column& c : d.columns) result.columns.push_back(std::move(c));
+  if (options.dictionary) {
+    for (DictionaryColumn& d : dictionary(predictor)) {
+      Column c;
+      c.name = d.name;
+      summarise(d.rows, c);
+      result.columns.push_back(std::move(c));
+    }
+  }
+  // Scatter of a score per unit of norm, over blocks that carry a column at all.
+  std::vector<double> ratios;
+  for (const Column& c : result.columns)
+    for (Eigen::Index b = 0; b < blocks; ++b)
+      if (c.norm2 > 0 && c.block_norm[b] > 0.2 * c.norm2 / static_cast<double>(blocks))
+        ratios.push_back(c.block_score[b] * c.block_score[b] / c.block_norm[b]);
+  if (!ratios.empty()) result.noise_unit = std::max(0.05, series::median(ratios) / 0.455);
+
+  Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
+  double rare = 0;
+  for (std::size_t k = 0; k < result.columns.size(); ++k) {
+    scores.col(static_cast<Eigen::Index>(k)) = result.columns[k].block_score;
+    const Column& c = result.columns[k];
+    if (c.norm2 > 0) rare = std::max(rare, std::abs(c.score) / std::sqrt(result.noise_unit * c.norm2));
+  }
+  result.p_value = flip_p_value(scores, options.flips, options.seed, &result.max_T);
+  result.rare_p = std::min(1.0, 2 * upper_tail(rare) * static_cast<double>(result.columns.size()));
+
+  // The best shape speaks for a hypothesis.
+  std::vector<Screened> best(library.hypotheses.size());
+  for (const Done& d : done) {
+    Screened s = d.screened;
+    for (const Column& c : d.columns)
+      if (c.norm2 > 0) s.rare_z = std::max(s.rare_z, std::abs(c.score) / std::sqrt(result.noise_unit * c.norm2));
+    Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
+    const double reach = std::max(b.reach, s.reach);
+    if (b.hypothesis < 0 || s.gain > b.gain) b = s;
+    b.reach = reach;
+  }
+  for (const Screened& s : best)
+    if (s.hypothesis >= 0) result.candidates.push_back(s);
+  std::stable_sort(result.candidates.begin(), result.candidates.end(),
+                   [](const Screened& a, const Screened& b) { return a.gain > b.gain; });
+  return result;
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,77 @@
+/// @file
+/// Is anything missing, and what could it be: scores of every effect's response, freed of what the baseline can mimic.
+///
+///   x⊥ = x − S (SᵀS)⁻¹ Sᵀ x      response of an effect, less what a change of the fitted parameters does as well
+///   g_b = Σ_{i∈b} x⊥_i r_i       score of block b
+///   T = |Σ g_b| / √(Σ g_b²)      and the largest T over all responses, its p-value by flipping the signs of whole blocks
+///
+/// A flip leaves the distribution of noise as it is, however it is coloured within a block; no noise model enters.
+/// T has no power where an effect shows in a few blocks only (a slip, a stop that is hardly touched), because those blocks are
+/// their own yardstick: for these the score is measured by what blocks elsewhere scatter (`rare`, Bonferroni).
+/// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
+/// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "isac/explain/fit.hpp"
+
+namespace isac::explain {
+
+/// One column of evidence: a response, projected.
+struct Column {
+  int hypothesis = -1;  ///< index in the library, −1 for the generic dictionary
+  int shape = 0, amplitude = 0;
+  std::string name;           ///< of a dictionary column
+  Eigen::VectorXd block_score, block_norm;  ///< g_b, Σ x⊥²
+  double score = 0, norm2 = 0;  ///< Σ g_b, Σ x⊥²
+  double raw_norm2 = 0;         ///< Σ x²: what was there before the projection
+  double T = 0;
+};
+
+struct Screened {
+  int hypothesis = -1, shape = 0;
+  Values start{};        ///< amplitudes as a linear fit would have them
+  double gain = 0;       ///< drop of the loss by that linear fit, within the signs that the effect allows
+  double T = 0;          ///< largest of its columns
+  double rare_z = 0;     ///< largest of its columns' scores against the scatter of blocks elsewhere
+  double reach = 0;      ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
+};
+
+struct Screen {
+  std::vector<Screened> candidates;  ///< best shape of each hypothesis, largest gain first
+  std::vector<Column> columns;       ///< all, without their rows
+  double max_T = 0;
+  double p_value = 1;       ///< of the largest T, by flips
+  double rare_p = 1;        ///< of the largest rare score, Bonferroni
+  double noise_unit = 1;    ///< variance of a score per unit of norm: 1 for white rows of unit variance
+};
+
+struct ScreenOptions {
+  int flips = 1999;
+  std::uint64_t seed = 1;
+  int threads = 2;
+  bool dictionary = false;  ///< the generic functions too
+};
+
+[[nodiscard]] Screen screen(const Predictor& predictor, const Fit& fit, const Library& library, const Weights& weights,
+                            const ScreenOptions& options);
+
+/// Orthonormal basis of the fitted parameters' sensitivities.
+[[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);
+
+/// p-value of the largest |Σ g|/√Σ g² over columns (rows: blocks), by joint sign flips of the blocks.
+[[nodiscard]] double flip_p_value(const Eigen::MatrixXd& block_scores, int flips, std::uint64_t seed, double* statistic = nullptr);
+
+/// Generic functions of the measured signals, one column each: what an unknown effect may look like.
+struct DictionaryColumn {
+  std::string name;
+  std::vector<std::string> variables;
+  Eigen::VectorXd rows;
+};
+[[nodiscard]] std::vector<DictionaryColumn> dictionary(const Predictor& predictor);
+
+}  // namespace isac::explain

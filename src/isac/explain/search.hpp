@@ -1,0 +1,63 @@
+/// @file
+/// The search: gate, shortlist, joint refits, the set that is left, and one effect after another until nothing is.
+///
+/// Forward: the best candidate is added while the residual still shows something significant and material; swap: each added
+/// effect is given up once for a better one; backward: each is dropped once and must be missed. At most `most_effects`.
+/// Threads: uses options.threads. Errors: none. Source: docs/derivations/explain.md.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "isac/explain/compare.hpp"
+#include "isac/explain/explain.hpp"
+#include "isac/explain/screen.hpp"
+
+namespace isac::explain {
+
+struct Floors {
+  double white[kChains] = {kNotKnown, kNotKnown, kNotKnown, kNotKnown};  ///< of one sample at the recording's rate, N m or Pa
+  std::string from[kChains];
+};
+
+/// A candidate that was refitted beside what was there already.
+struct Trial {
+  int hypothesis = -1;
+  Fit fit;
+  Comparison behind;     ///< of the best trial
+  double weight = 0;     ///< share of belief among the trials
+  double material = 0;   ///< rms of what it explains over the floor of the chain where it shows most
+  bool in_set = false;
+};
+
+struct Gate {
+  bool significant = false, material = false;
+  double p_value = 1;
+  double size = 0;  ///< rms of the largest explainable part over the floor, in its best chain
+  Chain chain = Chain::kTorque;
+};
+
+struct Step {
+  std::vector<Trial> trials;  ///< best first
+  Screen screen;
+  Gate gate;
+};
+
+struct Found {
+  Fit baseline, model;
+  Weights weights;
+  Floors floors;
+  std::vector<Step> steps;       ///< one for each effect that was added, and the last that was not
+  std::vector<int> added;        ///< hypotheses, in order
+  bool adequate = true;          ///< nothing significant and material is left
+  Gate gate;                     ///< of the baseline
+  std::vector<TrialNote> notes;
+};
+
+[[nodiscard]] Found search(const Predictor& predictor, const Library& library, Prepared& data, const ExplainOptions& options);
+
+/// rms over the floor, chain by chain, of what distinguishes two weighted residuals; the largest and where.
+[[nodiscard]] double size_over_floor(const Prepared& data, const Weights& weights, const Floors& floors,
+                                     const Eigen::VectorXd& difference, Chain* where = nullptr);
+
+}  // namespace isac::explain
