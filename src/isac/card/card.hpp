@@ -17,6 +17,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "isac/core/status.hpp"
 
@@ -62,6 +63,11 @@ class Card {
     static_cast<void>(command);
     return Status::kNotPermitted;
   }
+  /// The card's clock now, so that a late answer can be told from a late question; −1 where time stands still meanwhile.
+  [[nodiscard]] virtual std::int64_t now_ns() const noexcept { return -1; }
+  /// After a failure, with the valves vented: which channel does not answer and why, or nothing. Not for the loop: it
+  /// allocates and may take a second per dead channel.
+  [[nodiscard]] virtual std::string diagnose() { return {}; }
 };
 
 /// What the person at the joint is asked to do; on the simulated rig a simulated person does it.
@@ -106,6 +112,7 @@ class Person {
 struct Opened {
   std::unique_ptr<Card> card;
   std::unique_ptr<Person> person;
+  std::vector<std::string> remarks{};  ///< what whoever runs it should know, a sentence each
 };
 
 /// "sim:", "sim:seed=3,noise=white" (sim_options.hpp lists all), "replay:FILE".

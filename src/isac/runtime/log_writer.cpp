@@ -1,16 +1,8 @@
 #include "isac/runtime/log_writer.hpp"
 
-#include <chrono>
-
 #include "isac/core/units.hpp"
 
 namespace isac::runtime {
-namespace {
-
-/// How long either side naps when the ring is empty or (virtual time) full.
-constexpr std::chrono::microseconds kNap{500};
-
-}  // namespace
 
 std::vector<record::LogColumn> log_columns(const card::Shape& shape, bool raw) {
   std::vector<record::LogColumn> columns = {
@@ -29,34 +21,13 @@ std::vector<record::LogColumn> log_columns(const card::Shape& shape, bool raw) {
 
 LogWriter::LogWriter(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata,
                      const card::Shape& shape, bool raw, std::size_t ring_rows)
-    : log_(path, log_columns(shape, raw), metadata), shape_(shape), raw_(raw), ring_(ring_rows) {
-  values_.reserve(log_columns(shape, raw).size());
-  thread_ = std::thread([this] { write_rows(); });
-}
-
-LogWriter::~LogWriter() {
-  stop_.store(true, std::memory_order_release);
-  if (thread_.joinable()) thread_.join();
-}
-
-bool LogWriter::push(const LogRow& row) noexcept {
-  if (ring_.push(row)) return true;
-  dropped_.fetch_add(1, std::memory_order_relaxed);
-  return false;
-}
-
-bool LogWriter::push_waiting(const LogRow& row) noexcept {
-  while (!ring_.push(row)) {
-    if (failed()) return false;
-    std::this_thread::sleep_for(kNap);
-  }
-  return true;
-}
+    : log_(path, log_columns(shape, raw), metadata),
+      shape_(shape),
+      raw_(raw),
+      writer_([this](const LogRow& row) { append(row); }, ring_rows) {}
 
 std::uint64_t LogWriter::finish() {
-  stop_.store(true, std::memory_order_release);
-  if (thread_.joinable()) thread_.join();
-  if (error_) std::rethrow_exception(error_);
+  writer_.finish();
   log_.close();
   return log_.rows();
 }
@@ -75,21 +46,6 @@ void LogWriter::append(const LogRow& row) {
     add(row.command.output, shape_.outputs);
   }
   log_.append(values_);
-}
-
-void LogWriter::write_rows() noexcept {
-  try {
-    LogRow row;
-    for (;;) {
-      const bool last_round = stop_.load(std::memory_order_acquire);  // read before the ring is emptied
-      while (ring_.pop(row)) append(row);
-      if (last_round) return;
-      std::this_thread::sleep_for(kNap);
-    }
-  } catch (...) {
-    error_ = std::current_exception();
-    failed_.store(true, std::memory_order_release);
-  }
 }
 
 }  // namespace isac::runtime

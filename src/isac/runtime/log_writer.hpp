@@ -8,18 +8,15 @@
 /// finish() throws what happened (isac::Error, "disk_full" and the like).
 #pragma once
 
-#include <atomic>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <map>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "isac/record/csv_writer.hpp"
 #include "isac/runtime/log_row.hpp"
-#include "isac/runtime/spsc_ring.hpp"
+#include "isac/runtime/ring_writer.hpp"
 
 namespace isac::runtime {
 
@@ -27,33 +24,25 @@ class LogWriter {
  public:
   LogWriter(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata,
             const card::Shape& shape, bool raw, std::size_t ring_rows = 8192);
-  ~LogWriter();
-  LogWriter(const LogWriter&) = delete;
-  LogWriter& operator=(const LogWriter&) = delete;
 
   /// False when the ring is full: the row is lost and counted.
-  bool push(const LogRow& row) noexcept;
+  bool push(const LogRow& row) noexcept { return writer_.push(row); }
   /// Waits for room instead of losing the row; only where time is virtual. False once the writer has failed.
-  bool push_waiting(const LogRow& row) noexcept;
-  [[nodiscard]] bool failed() const noexcept { return failed_.load(std::memory_order_acquire); }
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+  bool push_waiting(const LogRow& row) noexcept { return writer_.push_waiting(row); }
+  [[nodiscard]] bool failed() const noexcept { return writer_.failed(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return writer_.dropped(); }
 
   /// Writes what is left, closes the log, throws what went wrong. Returns the rows written.
   std::uint64_t finish();
 
  private:
-  void write_rows() noexcept;
   void append(const LogRow& row);
 
   record::AppendLog log_;
   card::Shape shape_;
   bool raw_;
-  SpscRing<LogRow> ring_;
   std::vector<double> values_;  ///< one row in the units of the file; the writer thread's own
-  std::atomic<bool> stop_{false}, failed_{false};
-  std::atomic<std::uint64_t> dropped_{0};
-  std::exception_ptr error_;
-  std::thread thread_;
+  RingWriter<LogRow> writer_;   ///< last: its thread uses all of the above
 };
 
 /// Columns in the order append() fills them.
