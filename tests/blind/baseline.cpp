@@ -1,0 +1,230 @@
+#include "baseline.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace blind {
+namespace {
+
+constexpr std::size_t kHalf = 25;  // rows, 50 ms
+
+/// Sums for one normal system of up to eight unknowns, filled row by row.
+struct Normal {
+  std::size_t n;
+  std::vector<double> matrix, right;
+  explicit Normal(std::size_t count) : n(count), matrix(count * count, 0.0), right(count, 0.0) {}
+
+  /// LDLᵀ with the diagonal scaled to one.
+  [[nodiscard]] std::vector<double> solve() const {
+    std::vector<double> scale(n), L(n * n, 0.0), d(n, 0.0), x(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i)
+      scale[i] = matrix[i * n + i] > 0.0 ? 1.0 / std::sqrt(matrix[i * n + i]) : 0.0;
+    for (std::size_t j = 0; j < n; ++j) {
+      double pivot = matrix[j * n + j] * scale[j] * scale[j];
+      for (std::size_t k = 0; k < j; ++k) pivot -= L[j * n + k] * L[j * n + k] * d[k];
+      d[j] = pivot > 1e-12 ? pivot : 0.0;
+      for (std::size_t i = j + 1; i < n && d[j] > 0.0; ++i) {
+        double sum = matrix[i * n + j] * scale[i] * scale[j];
+        for (std::size_t k = 0; k < j; ++k) sum -= L[i * n + k] * L[j * n + k] * d[k];
+        L[i * n + j] = sum / d[j];
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] = right[i] * scale[i];
+      for (std::size_t k = 0; k < i; ++k) x[i] -= L[i * n + k] * x[k];
+    }
+    for (std::size_t i = 0; i < n; ++i) x[i] = d[i] > 0.0 ? x[i] / d[i] : 0.0;
+    for (std::size_t i = n; i-- > 0;)
+      for (std::size_t k = i + 1; k < n; ++k) x[i] -= L[k * n + i] * x[k];
+    for (std::size_t i = 0; i < n; ++i) x[i] *= scale[i];
+    return x;
+  }
+};
+
+struct Powers {
+  double pp = 0, pg = 0, gg = 0;
+};
+
+/// What unit lags of T_C leave of the pressures, K_C being the best: pp − pg²/gg.
+Powers pressure_powers(const std::vector<RunPlan>& runs, const std::vector<Signals>& signals, double T_C) {
+  Powers sum;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].heldout) continue;
+    const double share = 1.0 - std::exp(-kRowTime / T_C);
+    for (int valve = 0; valve < 2; ++valve) {
+      const auto& u = valve == 0 ? runs[i].command_1 : runs[i].command_2;
+      const auto& p = valve == 0 ? signals[i].p1 : signals[i].p2;
+      double g = u.front();
+      for (std::size_t k = 0; k < u.size(); ++k) {
+        sum.pp += p[k] * p[k];
+        sum.pg += p[k] * g;
+        sum.gg += g * g;
+        g += share * (u[k] - g);
+      }
+    }
+  }
+  return sum;
+}
+
+void fit_valves(Baseline& base, const Rig& rig, const std::vector<RunPlan>& runs,
+                const std::vector<Signals>& signals) {
+  const auto left = [&](double T_C) {
+    const Powers s = pressure_powers(runs, signals, T_C);
+    return s.pp - s.pg * s.pg / s.gg;
+  };
+  // The lowest point of a parabola through three points, three times, each time closer.
+  double T = rig.T_C, width = 0.1;
+  for (int round = 0; round < 4; ++round) {
+    const double a = left(T * (1.0 - width)), b = left(T), c = left(T * (1.0 + width));
+    const double bend = a - 2.0 * b + c;
+    const double move = bend > 0.0 ? 0.5 * (a - c) / bend : (a < c ? -1.0 : 1.0);
+    T *= 1.0 + width * std::clamp(move, -3.0, 3.0);
+    if (std::abs(move) < 1.0) width *= 0.3;
+  }
+  const Powers s = pressure_powers(runs, signals, T);
+  base.T_C = T;
+  base.K_C = s.pg / s.gg;
+}
+
+double mean_square(const std::vector<double>& x, double& count) {
+  double sum = 0.0;
+  for (const double value : x) sum += value * value;
+  count += static_cast<double>(x.size());
+  return sum;
+}
+
+}  // namespace
+
+double acceleration_noise(double angle_sd) {
+  const double span = static_cast<double>(kHalf) * kRowTime;
+  return std::sqrt(6.0) * angle_sd / (span * span);
+}
+
+std::vector<double> velocity_of(const std::vector<double>& angle) {
+  const auto last = static_cast<std::ptrdiff_t>(angle.size()) - 1;
+  // Runs begin at rest, so the angle before the first row mirrors the angle after it.
+  const auto at = [&](std::ptrdiff_t k) {
+    return angle[static_cast<std::size_t>(std::min(std::abs(k), last))];
+  };
+  std::vector<double> v(angle.size());
+  for (std::ptrdiff_t k = 0; k <= last; ++k)
+    v[static_cast<std::size_t>(k)] = (8.0 * (at(k + 1) - at(k - 1)) - at(k + 2) + at(k - 2)) / 12.0 * kRate;
+  return v;
+}
+
+std::vector<double> triangle_mean(const std::vector<double>& x) {
+  // Two running means of kHalf rows each.
+  const auto running = [](const std::vector<double>& in) {
+    std::vector<double> out;
+    if (in.size() < kHalf) return out;
+    out.reserve(in.size());
+    double sum = 0.0;
+    for (std::size_t i = 0; i < in.size(); ++i) {
+      sum += in[i];
+      if (i + 1 < kHalf) continue;
+      out.push_back(sum / static_cast<double>(kHalf));
+      sum -= in[i + 1 - kHalf];
+    }
+    return out;
+  };
+  return running(running(x));
+}
+
+std::vector<double> unit_lag(const std::vector<double>& command, double T_C) {
+  const double share = 1.0 - std::exp(-kRowTime / T_C);
+  std::vector<double> g(command.size());
+  double value = command.front();
+  for (std::size_t k = 0; k < command.size(); ++k) {
+    g[k] = value;
+    value += share * (command[k] - value);
+  }
+  return g;
+}
+
+std::vector<double> least_squares(const std::vector<std::vector<double>>& columns,
+                                  const std::vector<double>& y) {
+  Normal normal(columns.size());
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = 0.0;
+      for (std::size_t k = 0; k < y.size(); ++k) sum += columns[i][k] * columns[j][k];
+      normal.matrix[i * normal.n + j] = normal.matrix[j * normal.n + i] = sum;
+    }
+    for (std::size_t k = 0; k < y.size(); ++k) normal.right[i] += columns[i][k] * y[k];
+  }
+  return normal.solve();
+}
+
+Baseline fit_baseline(const Rig& rig, const std::vector<RunPlan>& runs, const std::vector<Signals>& signals) {
+  Normal normal(4);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].heldout) continue;
+    const Signals& s = signals[i];
+    const std::vector<double> v = velocity_of(s.angle);
+    for (std::size_t k = 0; k < v.size(); ++k) {
+      const double row[4] = {rig.r * rig.r * s.angle[k], rig.r * 0.5 * (s.p2[k] - s.p1[k]),
+                             -v[k] * v[k] * v[k], -v[k]};
+      const double T = (s.F2[k] - s.F1[k]) * rig.r;
+      for (std::size_t a = 0; a < 4; ++a) {
+        for (std::size_t b = 0; b < 4; ++b) normal.matrix[a * 4 + b] += row[a] * row[b];
+        normal.right[a] += row[a] * T;
+      }
+    }
+  }
+  const std::vector<double> x = normal.solve();
+  Baseline base{x[0], x[1], x[2], x[3], 0.0, 0.0};
+  fit_valves(base, rig, runs, signals);
+  return base;
+}
+
+Residuals residuals(const Rig& rig, const Baseline& base, const RunPlan& run, const Signals& s) {
+  Residuals out;
+  const std::size_t rows = s.angle.size();
+  const std::vector<double> v = velocity_of(s.angle);
+  std::vector<double> torque(rows);
+  out.torque.resize(rows);
+  for (std::size_t k = 0; k < rows; ++k) {
+    torque[k] = (s.F2[k] - s.F1[k]) * rig.r;
+    out.torque[k] =
+        torque[k] - (base.A * rig.r * rig.r * s.angle[k] + base.B * rig.r * 0.5 * (s.p2[k] - s.p1[k]) -
+                     base.C * v[k] * v[k] * v[k] - base.D * v[k]);
+  }
+  out.p1 = unit_lag(run.command_1, base.T_C);
+  out.p2 = unit_lag(run.command_2, base.T_C);
+  for (std::size_t k = 0; k < rows; ++k) {
+    out.p1[k] = s.p1[k] - base.K_C * out.p1[k];
+    out.p2[k] = s.p2[k] - base.K_C * out.p2[k];
+  }
+  if (run.free && rows > 2 * kHalf) {
+    out.balance = triangle_mean(torque);
+    constexpr double kSpan = static_cast<double>(kHalf) * kRowTime;
+    for (std::size_t k = 0; k < out.balance.size(); ++k) {
+      // The triangle's middle is row k + kHalf − 1.
+      const std::size_t m = k + kHalf - 1;
+      if (m < kHalf || m + kHalf >= rows) {
+        out.balance[k] = 0.0;
+        continue;
+      }
+      out.balance[k] -=
+          rig.inertia * (s.angle[m + kHalf] - 2.0 * s.angle[m] + s.angle[m - kHalf]) / (kSpan * kSpan);
+    }
+  }
+  return out;
+}
+
+Gap gap_of(const Rig& rig, const Baseline& base, const std::vector<RunPlan>& runs,
+           const std::vector<Signals>& signals, bool heldout) {
+  double torque = 0, pressure = 0, balance = 0, n_torque = 0, n_pressure = 0, n_balance = 0;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (runs[i].heldout != heldout) continue;
+    const Residuals rest = residuals(rig, base, runs[i], signals[i]);
+    torque += mean_square(rest.torque, n_torque);
+    pressure += mean_square(rest.p1, n_pressure);
+    pressure += mean_square(rest.p2, n_pressure);
+    balance += mean_square(rest.balance, n_balance);
+  }
+  const auto root = [](double sum, double count) { return count > 0.0 ? std::sqrt(sum / count) : 0.0; };
+  return {root(torque, n_torque), root(pressure, n_pressure), root(balance, n_balance)};
+}
+
+}  // namespace blind

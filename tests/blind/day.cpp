@@ -1,0 +1,246 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "rig.hpp"
+
+namespace blind {
+namespace {
+
+constexpr double kTwoPi = 2.0 * std::numbers::pi;
+using Reference = std::function<double(double)>;  // of the time in s
+
+/// Sines of uneven frequencies and phases, peak about one.
+Reference multisine(Random& random, double slowest, double fastest, int count) {
+  std::vector<std::array<double, 3>> parts;
+  double sum = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const double f = slowest * std::pow(fastest / slowest, (i + random.uniform(0.1, 0.9)) / count);
+    const double size = random.uniform(0.6, 1.0);
+    parts.push_back({kTwoPi * f, random.uniform(0.0, kTwoPi), size});
+    sum += size;
+  }
+  return [parts, sum](double t) {
+    double x = 0.0;
+    for (const auto& [omega, phase, size] : parts) x += size * std::sin(omega * t + phase);
+    return 1.5 * x / sum;
+  };
+}
+
+/// Levels held for a while, as a table.
+Reference levels(const std::vector<double>& values, double hold) {
+  return [values, hold](double t) {
+    const auto i = static_cast<std::size_t>(std::max(0.0, t / hold));
+    return values[std::min(i, values.size() - 1)];
+  };
+}
+
+/// There and back between ±1 by hand: no two strokes are equally fast or equally long.
+Reference triangle(Random& random, double speed_low, double speed_high, double seconds) {
+  std::vector<std::array<double, 2>> corners = {{0.0, 0.0}};
+  double side = random.sign();
+  while (corners.back()[0] < seconds + 5.0) {
+    const double target = side * random.uniform(0.85, 1.0);
+    const double speed = random.log_uniform(speed_low, speed_high) * random.uniform(0.9, 1.1);
+    corners.push_back({corners.back()[0] + std::abs(target - corners.back()[1]) / speed, target});
+    side = -side;
+  }
+  return [corners](double t) {
+    const auto next = std::upper_bound(corners.begin(), corners.end(), t,
+                                       [](double time, const auto& corner) { return time < corner[0]; });
+    if (next == corners.end()) return corners.back()[1];
+    if (next == corners.begin()) return corners.front()[1];
+    const auto& [t0, x0] = *(next - 1);
+    return x0 + ((*next)[1] - x0) * (t - t0) / ((*next)[0] - t0);
+  };
+}
+
+/// A hand follows the reference as three lags of 1/35 s: no jumps in the acceleration.
+void follow(RunPlan& run, const Reference& reference, double offset, double amplitude, int rows) {
+  constexpr double kBandwidth = 35.0, kStep = kRowTime / 4;
+  double x = offset + amplitude * reference(0.0), y = x, z = x;
+  for (int k = 0; k < rows; ++k) {
+    run.hand.push_back(z);
+    run.hand_velocity.push_back(kBandwidth * (y - z));
+    for (int i = 0; i < 4; ++i) {
+      // Exact for an input that is held: three equal lags.
+      const double u = offset + amplitude * reference(k * kRowTime + (i + 0.5) * kStep);
+      const double h = kBandwidth * kStep, decay = std::exp(-h);
+      const double ex = x - u, ey = y - u, ez = z - u;
+      x = u + decay * ex;
+      y = u + decay * (ey + h * ex);
+      z = u + decay * (ez + h * ey + 0.5 * h * h * ex);
+    }
+  }
+}
+
+class Day {
+ public:
+  Day(const Rig& rig, Random& random) : rig_(rig), random_(random) {}
+
+  std::vector<RunPlan> plan() {
+    const double low = 2.2 + random_.uniform(-0.1, 0.2), high = 3.7 + random_.uniform(-0.1, 0.2);
+    sweep(0.0, rig_.p0, 0.15, 0.4, 50.0);
+    sweep(random_.uniform(0.5, 0.9), rig_.p0, 1.0, 4.5, 40.0);
+    bundle(-random_.uniform(0.5, 0.9), high, 45.0);
+    bundle(random_.uniform(0.1, 0.4), low, 45.0);
+    clamped(random_.uniform(-0.1, 0.1), 45.0);
+    clamped(random_.sign() * random_.uniform(0.3, 0.6), 40.0);
+    free_moving(1.0, 45.0);
+    free_moving(0.7, 35.0);
+    release(15.0);
+    steps(40.0);
+    const std::size_t fitted = runs_.size();
+    bundle(random_.uniform(-0.5, -0.2), random_.uniform(2.6, 3.4), 45.0);
+    sweep(random_.uniform(-0.9, 0.9), random_.uniform(2.4, 3.6), 0.5, 3.0, 40.0);
+    clamped(random_.uniform(-0.4, 0.4), 40.0);
+    free_moving(0.85, 45.0);
+    steps(35.0);
+    for (std::size_t i = fitted; i < runs_.size(); ++i) runs_[i].heldout = true;
+    order();
+    return std::move(runs_);
+  }
+
+ private:
+  RunPlan& begin(const char* experiment) {
+    RunPlan run;
+    run.experiment = experiment;
+    runs_.push_back(std::move(run));
+    return runs_.back();
+  }
+  static int rows_of(double seconds) { return static_cast<int>(seconds * kRate); }
+
+  void command(RunPlan& run, double delta, double mean) {
+    run.command_1.push_back(std::clamp(mean - delta, 0.0, 5.0));
+    run.command_2.push_back(std::clamp(mean + delta, 0.0, 5.0));
+  }
+
+  /// No muscle may be pulled slack: |T| < 0.9 (F1 + F2) r at both ends.
+  [[nodiscard]] double reach(double delta, double mean) const {
+    const double largest = 0.9 * 2.0 * rig_.r * (rig_.pull_zero + rig_.pull_gain * mean);
+    const double stiffness = -rig_.A * rig_.r * rig_.r;
+    return std::min(1.1, (largest - rig_.B * rig_.r * std::abs(delta) - 1.5) / stiffness);
+  }
+
+  void hand(RunPlan& run, const Reference& reference, double delta, double mean, double share,
+            double seconds) {
+    follow(run, reference, 0.0, share * reach(delta, mean), rows_of(seconds));
+    for (int k = 0; k < rows_of(seconds); ++k) command(run, delta, mean);
+  }
+
+  void sweep(double delta, double mean, double slow, double fast, double seconds) {
+    hand(begin("constant-pressure"), triangle(random_, slow, fast, seconds), delta, mean,
+         random_.uniform(0.8, 1.0), seconds);
+  }
+
+  void bundle(double delta, double mean, double seconds) {
+    const Reference slow = triangle(random_, 0.2, 1.5, seconds), fast = multisine(random_, 0.1, 1.4, 6);
+    hand(
+        begin("constant-pressure"), [slow, fast](double t) { return 0.4 * slow(t) + 0.5 * fast(t); }, delta,
+        mean, random_.uniform(0.85, 1.0), seconds);
+  }
+
+  std::vector<double> drawn_levels(double low, double high, int count) {
+    std::vector<double> values;
+    for (int i = 0; i < count; ++i) values.push_back(random_.uniform(low, high));
+    return values;
+  }
+
+  void clamped(double angle, double seconds) {
+    RunPlan& run = begin("constant-angle");
+    follow(
+        run, [](double) { return 1.0; }, 0.0, angle, rows_of(seconds));
+    const Reference wave = multisine(random_, 0.08, 1.0, 5);
+    const Reference stair = levels(drawn_levels(-1.7, 1.7, 20), random_.uniform(1.6, 2.4));
+    const Reference means = levels(drawn_levels(2.0, 3.6, 8), seconds / 7.0);
+    for (int k = 0; k < rows_of(seconds); ++k) {
+      const double t = k * kRowTime;
+      command(run, t < 0.5 * seconds ? 1.8 * wave(t) : stair(t - 0.5 * seconds), means(t));
+    }
+  }
+
+  void free_moving(double size, double seconds) {
+    RunPlan& run = begin("free");
+    run.free = true;
+    const Reference wave = multisine(random_, 0.1, 3.0, 7);
+    const Reference stair = levels(drawn_levels(-1.6, 1.6, 16), random_.uniform(1.4, 2.0));
+    const Reference means = levels(drawn_levels(2.3, 3.5, 5), seconds / 4.0);
+    const double at_rest = -rig_.B * rig_.r * size * (wave(0.0) * 1.5) / (rig_.A * rig_.r * rig_.r);
+    run.release_angle = at_rest + random_.sign() * random_.uniform(0.3, 0.6);
+    for (int k = 0; k < rows_of(seconds); ++k) {
+      const double t = k * kRowTime;
+      command(run, size * (t < 0.6 * seconds ? 1.5 * wave(t) : stair(t - 0.6 * seconds)), means(t));
+    }
+  }
+
+  void release(double seconds) {
+    RunPlan& run = begin("free");
+    run.free = true;
+    run.release_angle = random_.sign() * random_.uniform(0.7, 0.95);
+    const double mean = random_.uniform(2.4, 3.6);
+    const Reference stair = levels(drawn_levels(-1.0, 1.0, 4), 5.0);
+    for (int k = 0; k < rows_of(seconds); ++k)
+      command(run, k * kRowTime < 5.0 ? 0.0 : stair(k * kRowTime - 5.0), mean);
+  }
+
+  void steps(double seconds) {
+    RunPlan& run = begin("pcu-step");
+    follow(
+        run, [](double) { return 1.0; }, 0.0, random_.uniform(-0.05, 0.05), rows_of(seconds));
+    const double hold = random_.uniform(1.4, 1.8);
+    const auto count = static_cast<int>(seconds / hold) + 1;
+    std::vector<double> first, second;
+    for (int i = 0; i < count; ++i) {
+      // Small and large ones, to low and to high levels, one valve at a time or both.
+      const double size = i % 3 == 0 ? random_.uniform(0.1, 0.4) : random_.uniform(0.8, 3.5);
+      const auto step = [&](const std::vector<double>& past) {
+        const double from = past.empty() ? 3.0 : past.back();
+        const double up = from + size, down = from - size;
+        const bool rise = up <= 4.9 && (down < 0.15 || random_.uniform() < 0.5);
+        return rise ? up : std::max(0.15, down);
+      };
+      const int which = random_.index(3);
+      first.push_back(which == 1 && i > 0 ? first.back() : step(first));
+      second.push_back(which == 2 && i > 0 ? second.back() : step(second));
+    }
+    const Reference one = levels(first, hold), two = levels(second, hold);
+    for (int k = 0; k < rows_of(seconds); ++k) {
+      run.command_1.push_back(one(k * kRowTime));
+      run.command_2.push_back(two(k * kRowTime));
+    }
+  }
+
+  /// The order in which the runs were recorded is drawn; between two runs the rig rests 20 to 60 s.
+  void order() {
+    for (std::size_t i = runs_.size() - 1; i > 0; --i)
+      std::swap(runs_[i], runs_[static_cast<std::size_t>(random_.index(static_cast<int>(i) + 1))]);
+    double clock = 0.0;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      runs_[i].started = clock;
+      runs_[i].name = (i < 9 ? "run_0" : "run_") + std::to_string(i + 1);
+      clock += std::ceil(runs_[i].rows() * kRowTime + random_.uniform(20.0, 60.0));
+    }
+  }
+
+  const Rig& rig_;
+  Random& random_;
+  std::vector<RunPlan> runs_;
+};
+
+}  // namespace
+
+Rig draw_rig(Random& random) {
+  Rig rig;
+  for (double* value : {&rig.A, &rig.B, &rig.C, &rig.D, &rig.inertia, &rig.T_C})
+    *value *= random.uniform(0.7, 1.3);
+  rig.K_C *= random.uniform(0.97, 1.03);
+  return rig;
+}
+
+std::vector<RunPlan> draw_day(const Rig& rig, Random& random) {
+  return Day(rig, random).plan();
+}
+
+}  // namespace blind
