@@ -1,0 +1,30 @@
+/// @file
+/// The words of an isac-run call, and the run they ask for.
+#pragma once
+
+#include <string>
+
+#include "isac/core/estimated.hpp"
+#include "isac/runtime/control_session.hpp"
+
+namespace isac::apps {
+
+struct RunWords {
+  std::string card = "sim:", rig, params, log, flight, json, pace = "virtual", controller = "mbpi";
+  std::string duration, step, sine, frequency = "0.3183 Hz", points, torque = "0 N m", following, heartbeat;
+  std::string replayed;
+  double rate = 2000;
+  int joint = 1, priority = 80;
+  bool yes = false, require_rt = false, gains_of_seed = false;
+};
+
+struct AskedRun {
+  runtime::ControlRun run;
+  Warnings warnings;
+};
+
+/// `mode` is the subcommand: position, trajectory, torque, hand, replay.
+/// Throws isac::Error: usage for words that exclude each other, bad input for files.
+[[nodiscard]] AskedRun asked_run(const RunWords& words, const std::string& mode);
+
+}  // namespace isac::apps
