@@ -141,16 +141,16 @@ std::vector<double> unit_lag(const std::vector<double>& command, double T_C) {
   return g;
 }
 
-std::vector<double> least_squares(const std::vector<std::vector<double>>& columns,
+std::vector<double> least_squares(const std::vector<const std::vector<double>*>& columns,
                                   const std::vector<double>& y) {
   Normal normal(columns.size());
   for (std::size_t i = 0; i < columns.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = 0.0;
-      for (std::size_t k = 0; k < y.size(); ++k) sum += columns[i][k] * columns[j][k];
+      for (std::size_t k = 0; k < y.size(); ++k) sum += (*columns[i])[k] * (*columns[j])[k];
       normal.matrix[i * normal.n + j] = normal.matrix[j * normal.n + i] = sum;
     }
-    for (std::size_t k = 0; k < y.size(); ++k) normal.right[i] += columns[i][k] * y[k];
+    for (std::size_t k = 0; k < y.size(); ++k) normal.right[i] += (*columns[i])[k] * y[k];
   }
   return normal.solve();
 }

@@ -51,7 +51,7 @@ std::vector<double> unit_lag(const std::vector<double>& command, double T_C);
 
 /// Solves the normal equations of `columns` against `y` (all of one length) by Cholesky with a little scaling; a column
 /// that the others explain gets zero.
-std::vector<double> least_squares(const std::vector<std::vector<double>>& columns,
+std::vector<double> least_squares(const std::vector<const std::vector<double>*>& columns,
                                   const std::vector<double>& y);
 
 }  // namespace blind

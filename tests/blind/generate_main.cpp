@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -72,10 +73,12 @@ Words read_words(int count, char** words) {
 int generate(const Words& words) {
   const blind::Dataset dataset = blind::make_dataset(words.request);
   const bool testable = dataset.not_testable.empty();
+  std::optional<blind::Verdict> verdict;
+  if (words.oracle && testable && !dataset.hidings.empty()) verdict = blind::judge(dataset);
   blind::Gap noise;
   if (testable) noise = blind::heldout_noise(dataset, blind::write_dataset(dataset, words.out));
   std::ofstream label(words.label);
-  label << blind::label_of(dataset, noise, nullptr);
+  label << blind::label_of(dataset, noise, verdict ? &*verdict : nullptr);
   if (!label.flush()) throw std::runtime_error("cannot write " + words.label.string());
   return testable ? 0 : 1;
 }
