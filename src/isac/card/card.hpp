@@ -64,7 +64,7 @@ class Card {
     return Status::kNotPermitted;
   }
   /// The card's clock now, so that a late answer can be told from a late question; −1 where time stands still meanwhile.
-  [[nodiscard]] virtual std::int64_t now_ns() const noexcept { return -1; }
+  [[nodiscard]] virtual std::int64_t clock_ns() const noexcept { return -1; }
   /// After a failure, with the valves vented: which channel does not answer and why, or nothing. Not for the loop: it
   /// allocates and may take a second per dead channel.
   [[nodiscard]] virtual std::string diagnose() { return {}; }

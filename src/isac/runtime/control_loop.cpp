@@ -145,7 +145,7 @@ Finding ControlLoop::watch(double dt) noexcept {
 
 void ControlLoop::judge(const Finding& found, bool answered) noexcept {
   const std::int64_t stamp = answered ? row_.sample.time_ns : last_ns_ + period_ns_;
-  const std::int64_t clock = card_.now_ns();
+  const std::int64_t clock = card_.clock_ns();
   const control::RunState before = machine_.state();
   machine_.begin({.now = std::max(clock, stamp),
                   .sampled = stamp,
@@ -266,7 +266,7 @@ bool ControlLoop::cycle(Director& director, Live* live, CycleSink* sink) noexcep
   row_.answered = answered;
   if (!answered) {
     next_ns_ += period_ns_;
-    row_.time_ns = std::max(card_.now_ns(), last_ns_ + period_ns_) - first_ns_;
+    row_.time_ns = std::max(card_.clock_ns(), last_ns_ + period_ns_) - first_ns_;
   }
   const Finding found = answered ? watch(dt) : Finding{.code = FaultCode::kReadFailed};
   has_sample_ = has_sample_ || answered;

@@ -55,7 +55,7 @@ class SharedValves final : public card::Card {
     return card_->vent();
   }
   Status outputs(card::Command& command) const noexcept override { return card_->outputs(command); }
-  [[nodiscard]] std::int64_t now_ns() const noexcept override { return card_->now_ns(); }
+  [[nodiscard]] std::int64_t clock_ns() const noexcept override { return card_->clock_ns(); }
   [[nodiscard]] std::string diagnose() override { return card_->diagnose(); }
 
  private:
