@@ -15,9 +15,9 @@
 
 #include "common/program.hpp"
 #include "common/quantity.hpp"
+#include "common/summary.hpp"
 #include "identify/commands.hpp"
 #include "identify/inputs.hpp"
-#include "identify/summary.hpp"
 #include "isac/card/calibration.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "common/program.hpp"
+#include "common/summary.hpp"
 #include "identify/commands.hpp"
 #include "identify/inputs.hpp"
-#include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/record/answer.hpp"
 #include "isac/record/csv_writer.hpp"

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/program.hpp"
+#include "common/summary.hpp"
 #include "identify/commands.hpp"
-#include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/estimate/compare.hpp"
 #include "isac/record/params.hpp"

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "common/program.hpp"
+#include "common/summary.hpp"
 #include "identify/commands.hpp"
-#include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/models/parameter_table.hpp"
 #include "isac/record/params.hpp"

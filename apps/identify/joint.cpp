@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "common/program.hpp"
+#include "common/summary.hpp"
 #include "identify/commands.hpp"
 #include "identify/inputs.hpp"
 #include "identify/joint_stream.hpp"
-#include "identify/summary.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/joint_fit.hpp"

@@ -1,4 +1,4 @@
-#include "identify/summary.hpp"
+#include "common/summary.hpp"
 
 #include <fmt/format.h>
 
