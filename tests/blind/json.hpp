@@ -51,6 +51,12 @@ class JsonWriter {
     text_ += yes ? "true" : "false";
     return *this;
   }
+  /// Text that is JSON already.
+  JsonWriter& raw(std::string_view json) {
+    begin();
+    text_ += json;
+    return *this;
+  }
   JsonWriter& null() {
     begin();
     text_ += "null";
@@ -75,7 +81,15 @@ class JsonWriter {
   }
   void quote(std::string_view word) {
     text_ += '"';
+    constexpr char kHex[] = "0123456789abcdef";
     for (const char c : word) {
+      const auto code = static_cast<unsigned char>(c);
+      if (code < 0x20) {
+        text_ += "\\u00";
+        text_ += kHex[code >> 4];
+        text_ += kHex[code & 15];
+        continue;
+      }
       if (c == '"' || c == '\\') text_ += '\\';
       text_ += c;
     }

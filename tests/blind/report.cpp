@@ -1,0 +1,264 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+#include "score.hpp"
+
+namespace blind {
+namespace {
+
+struct Scored {
+  const Case* one;
+  Judgement j;
+};
+using Group = std::vector<Scored>;
+
+std::string fixed(double x, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*f", digits, x);
+  return text;
+}
+
+/// "47/50 = 94 % (84 to 98)": the Wilson interval of 95 %.
+std::string share(double hits, double count) {
+  if (count == 0.0) return "–";
+  constexpr double z = 1.96;
+  const double p = hits / count, wide = 1.0 + z * z / count;
+  const double middle = (p + z * z / (2.0 * count)) / wide;
+  const double half = z / wide * std::sqrt(p * (1.0 - p) / count + z * z / (4.0 * count * count));
+  return fixed(hits, 0) + "/" + fixed(count, 0) + " = " + fixed(100.0 * p, 1) + " % (" +
+         fixed(100.0 * std::max(0.0, middle - half), 1) + " to " +
+         fixed(100.0 * std::min(1.0, middle + half), 1) + ")";
+}
+
+template <typename Predicate>
+std::string share_of(const Group& group, Predicate&& yes) {
+  return share(static_cast<double>(std::count_if(group.begin(), group.end(), yes)),
+               static_cast<double>(group.size()));
+}
+
+template <typename Predicate>
+Group only(const Group& group, Predicate&& yes) {
+  Group out;
+  std::copy_if(group.begin(), group.end(), std::back_inserter(out), yes);
+  return out;
+}
+
+double quantile(std::vector<double> x, double q) {
+  if (x.empty()) return NAN;
+  std::sort(x.begin(), x.end());
+  const double at = q * static_cast<double>(x.size() - 1);
+  const auto i = static_cast<std::size_t>(at);
+  const double next = x[std::min(i + 1, x.size() - 1)];
+  return x[i] + (at - static_cast<double>(i)) * (next - x[i]);
+}
+
+std::string strength(const Truth& t) {
+  return t.ratio >= 1.5 ? "strong" : t.ratio >= 0.5 ? "clear" : "faint";
+}
+
+/// The largest distance between the p-values' distribution and the uniform one.
+double uniform_distance(std::vector<double> p) {
+  std::sort(p.begin(), p.end());
+  double largest = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const auto n = static_cast<double>(p.size()), k = static_cast<double>(i);
+    largest = std::max({largest, std::abs(p[i] - k / n), std::abs((k + 1.0) / n - p[i])});
+  }
+  return largest;
+}
+
+std::string false_alarms(const Group& none) {
+  std::string text =
+      "## Nothing hidden\n\n| noise | nothing named | no disagreement | p-values: largest distance from "
+      "uniform |\n|---|---|---|---|\n";
+  for (const char* noise : {"white", "coloured", "quantised", "real"}) {
+    const Group group = only(none, [&](const Scored& s) { return s.one->truth.noise == noise; });
+    if (group.empty()) continue;
+    std::vector<double> p;
+    for (const Scored& s : group)
+      p.insert(p.end(), s.one->answer.p_values.begin(), s.one->answer.p_values.end());
+    text +=
+        std::string("| ") + noise + " | " +
+        share_of(group,
+                 [](const Scored& s) {
+                   return s.one->answer.failed.empty() && s.one->answer.effects.empty() &&
+                          s.one->answer.alternatives.empty();
+                 }) +
+        " | " +
+        share_of(group,
+                 [](const Scored& s) { return s.one->answer.failed.empty() && !s.one->answer.detected; }) +
+        " | " +
+        (p.empty() ? "–"
+                   : fixed(uniform_distance(p), 3) + " (limit at 95 %: " +
+                         fixed(1.36 / std::sqrt(static_cast<double>(p.size())), 3) + ")") +
+        " |\n";
+  }
+  return text + "\n";
+}
+
+std::string singles(const Group& single) {
+  std::string text =
+      "## One effect hidden\n\n| strength | noise | detected | named first | among the first three | in the "
+      "set | mean set size | one name, wrong, not flagged | sensor or process "
+      "|\n|---|---|---|---|---|---|---|---|---|\n";
+  for (const char* size : {"strong", "clear", "faint"}) {
+    for (const char* noise : {"", "white", "coloured", "quantised", "real"}) {
+      const std::string kind = noise;
+      const Group group = only(single, [&](const Scored& s) {
+        return strength(s.one->truth) == size && (kind.empty() || s.one->truth.noise == kind);
+      });
+      if (group.empty()) continue;
+      double sizes = 0.0;
+      for (const Scored& s : group) sizes += s.j.set_size;
+      text += std::string("| ") + size + " | " + (kind.empty() ? "all" : kind) + " | " +
+              share_of(group, [](const Scored& s) { return s.one->answer.detected; }) + " | " +
+              share_of(group, [](const Scored& s) { return s.j.first; }) + " | " +
+              share_of(group, [](const Scored& s) { return s.j.first_three; }) + " | " +
+              share_of(group, [](const Scored& s) { return s.j.in_set; }) + " | " +
+              fixed(sizes / static_cast<double>(group.size()), 2) + " | " +
+              share_of(group, [](const Scored& s) { return s.j.single_wrong; }) + " | " +
+              share_of(group, [](const Scored& s) { return s.j.right_side; }) + " |\n";
+    }
+  }
+  const Group ties = only(single, [](const Scored& s) { return !s.one->truth.nearest_equal.empty(); });
+  return text + "\nTies by the oracle (a rival below 3 sigma), answered with a set that holds both: " +
+         share_of(ties, [](const Scored& s) { return s.j.in_set; }) + "\n\n";
+}
+
+std::string others(const Group& pair, const Group& unknown) {
+  std::string text;
+  if (!pair.empty())
+    text += "## Two effects hidden\n\n- both named: " +
+            share_of(pair, [](const Scored& s) { return s.j.all_named; }) +
+            "\n- both in the set: " + share_of(pair, [](const Scored& s) { return s.j.in_set; }) + "\n\n";
+  if (!unknown.empty())
+    text +=
+        "## An effect outside the catalogue\n\n- detected: " +
+        share_of(unknown, [](const Scored& s) { return s.one->answer.detected; }) +
+        "\n- left unnamed: " + share_of(unknown, [](const Scored& s) { return s.j.left_unnamed; }) +
+        "\n- left unnamed, with the right variables: " +
+        share_of(unknown, [](const Scored& s) { return s.j.right_variables; }) +
+        "\n- one name, not flagged: " + share_of(unknown, [](const Scored& s) { return s.j.single_wrong; }) +
+        "\n\n";
+  return text;
+}
+
+std::string gaps(const Group& named) {
+  std::vector<double> closed;
+  int worse = 0, given = 0;
+  for (const Scored& s : named) {
+    if (s.j.closed > -1.0) closed.push_back(s.j.closed);
+    if (s.one->answer.heldout_before <= 0.0) continue;
+    ++given;
+    if (s.one->answer.heldout_after > 1.001 * s.one->answer.heldout_before) ++worse;
+  }
+  if (closed.empty()) return "";
+  return "## Gap closed on held-out runs, relative to the true model\n\n- median " +
+         fixed(100.0 * quantile(closed, 0.5), 1) + " %, 5th percentile " +
+         fixed(100.0 * quantile(closed, 0.05), 1) + " %, of " + std::to_string(closed.size()) +
+         " datasets\n- worse than before: " + share(worse, given) + "\n\n";
+}
+
+std::string reliability(const Group& all) {
+  struct Bin {
+    double count = 0, hits = 0, stated = 0;
+  } bins[10];
+  double count = 0.0;
+  for (const Scored& s : all) {
+    for (std::size_t i = 0; i < s.one->answer.effects.size(); ++i) {
+      const double c = s.one->answer.confidences[i];
+      Bin& bin = bins[std::clamp(static_cast<int>(c * 10.0), 0, 9)];
+      const auto& ids = s.one->truth.ids;
+      ++bin.count;
+      ++count;
+      bin.stated += c;
+      bin.hits += std::find(ids.begin(), ids.end(), s.one->answer.effects[i]) != ids.end() &&
+                  s.one->truth.kind != "unknown";
+    }
+  }
+  if (count == 0.0) return "";
+  std::string text = "## Confidences of what was named\n\n| stated | mean stated | right |\n|---|---|---|\n";
+  double error = 0.0;
+  for (int i = 0; i < 10; ++i) {
+    if (bins[i].count == 0.0) continue;
+    error += std::abs(bins[i].stated - bins[i].hits) / count;
+    text += "| " + fixed(0.1 * i, 1) + " to " + fixed(0.1 * (i + 1), 1) + " | " +
+            fixed(bins[i].stated / bins[i].count, 3) + " | " + share(bins[i].hits, bins[i].count) + " |\n";
+  }
+  return text + "\nExpected calibration error: " + fixed(error, 3) + "\n\n";
+}
+
+std::string confusion(const Group& all) {
+  std::map<std::string, std::map<std::string, int>> table;
+  for (const Scored& s : all) {
+    if (s.one->truth.kind == "pair") continue;
+    const Answer& a = s.one->answer;
+    const std::string said = !a.failed.empty()   ? "(no answer)"
+                             : a.effects.empty() ? "(" + a.verdict + ")"
+                                                 : a.effects.front();
+    const std::string truth = s.one->truth.ids.empty() ? "(none)" : s.one->truth.ids.front();
+    ++table[truth][said];
+  }
+  std::string text =
+      "## Confusion matrix: hidden, and named first\n\n| hidden | datasets | right | also named (datasets) "
+      "|\n|---|---|---|---|\n";
+  for (const auto& [truth, said] : table) {
+    int count = 0;
+    std::vector<std::pair<int, std::string>> wrong;
+    for (const auto& [name, n] : said) {
+      count += n;
+      if (name != truth) wrong.emplace_back(-n, name);
+    }
+    std::sort(wrong.begin(), wrong.end());
+    const int right = said.contains(truth) ? said.at(truth) : 0;
+    text += "| " + truth + " | " + std::to_string(count) + " | " + std::to_string(right) + " |";
+    for (std::size_t i = 0; i < wrong.size(); ++i)
+      text += (i > 0 ? ", " : " ") + wrong[i].second + " (" + std::to_string(-wrong[i].first) + ")";
+    text += " |\n";
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string report(const std::vector<Case>& cases) {
+  Group asked;
+  std::map<std::string, int> silent;
+  std::set<std::string> untestable;
+  std::vector<double> seconds;
+  for (const Case& one : cases) {
+    if (!one.truth.testable) {
+      for (const std::string& id : one.truth.ids) untestable.insert(id);
+      continue;
+    }
+    asked.push_back({&one, judge_case(one)});
+    if (!one.answer.failed.empty()) ++silent[one.answer.failed];
+    if (one.answer.seconds > 0.0) seconds.push_back(one.answer.seconds);
+  }
+  const auto of_kind = [&](const char* kind) {
+    return only(asked, [&](const Scored& s) { return s.one->truth.kind == kind; });
+  };
+  std::string text = "# Blind datasets: " + std::to_string(asked.size()) +
+                     "\n\nShares with their Wilson interval of 95 %.\n\n";
+  for (const auto& [reason, count] : silent)
+    text += "- without an answer: " + std::to_string(count) + " (" + reason + ")\n";
+  if (!silent.empty()) text += "\n";
+  text += false_alarms(of_kind("none")) + singles(of_kind("single")) +
+          others(of_kind("pair"), of_kind("unknown"));
+  text += gaps(only(
+      asked, [](const Scored& s) { return s.one->truth.kind == "single" || s.one->truth.kind == "pair"; }));
+  text += reliability(asked) + confusion(asked);
+  if (!untestable.empty()) {
+    text += "Not testable at the strength asked for, so left out (some or all datasets):";
+    for (const std::string& id : untestable) text += " " + id;
+    text += "\n\n";
+  }
+  if (!seconds.empty())
+    text += "Seconds per dataset: median " + fixed(quantile(seconds, 0.5), 2) + ", largest " +
+            fixed(quantile(seconds, 1.0), 2) + "\n";
+  return text;
+}
+
+}  // namespace blind

@@ -1,0 +1,173 @@
+#include "score.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace blind {
+namespace {
+
+using nlohmann::json;
+
+bool holds(const std::vector<std::string>& list, const std::string& name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
+
+std::vector<std::string> words(const json& list) {
+  std::vector<std::string> out;
+  if (list.is_array())
+    for (const json& word : list) out.push_back(word.get<std::string>());
+  return out;
+}
+
+double number(const json& object, const char* name) {
+  return object.contains(name) && object[name].is_number() ? object[name].get<double>() : 0.0;
+}
+
+Truth read_truth(const json& label) {
+  Truth t;
+  t.kind = label.at("kind");
+  t.noise = label.at("noise");
+  t.side = label.at("side");
+  t.signal = label.value("signal", "");
+  t.ratio = label.at("ratio_asked");
+  t.testable = label.at("testable");
+  t.ids = words(label.at("ids"));
+  t.subsystems = words(label.at("subsystems"));
+  t.depends_on = words(label.at("depends_on"));
+  for (const auto& [signal, gap] : label.at("gap").items()) {
+    t.gap[signal] = number(gap, "heldout_before");
+    t.gap_noise[signal] = number(gap, "heldout_noise");
+  }
+  if (const json& oracle = label.at("oracle"); oracle.is_object()) {
+    double nearest = 3.0;
+    for (const auto& [id, sigma] : oracle.at("rivals").items()) {
+      if (!sigma.is_number() || sigma.get<double>() >= nearest) continue;
+      nearest = sigma.get<double>();
+      t.nearest_equal = id;
+    }
+  }
+  return t;
+}
+
+void read_effects(const json& j, Answer& a) {
+  for (const json& effect : j.at("effects")) {
+    a.effects.push_back(effect.at("id"));
+    a.subsystems.push_back(effect.value("subsystem", ""));
+    a.confidences.push_back(number(effect, "confidence"));
+  }
+  for (const json& effect : j.at("alternatives")) a.alternatives.push_back(effect.at("id"));
+}
+
+Answer read_answer(const std::string& text) {
+  Answer a;
+  const json j = json::parse(text, nullptr, false);
+  if (j.is_discarded() || !j.is_object() || j.value("schema", "") != "isac.explain/1") {
+    a.failed = "no answer of schema isac.explain/1";
+    return a;
+  }
+  try {
+    a.verdict = j.at("verdict");
+    const json& disagreement = j.at("disagreement");
+    a.detected = disagreement.at("detected");
+    for (const json& signal : disagreement.at("signals"))
+      if (signal.contains("p_value") && signal["p_value"].is_number())
+        a.p_values.push_back(signal["p_value"]);
+    if (const json& where = disagreement.at("where"); !where.empty()) a.where = where[0].at("subsystem");
+    read_effects(j, a);
+    if (const json& unknown = j.at("unknown"); unknown.is_object()) {
+      a.depends_on = words(unknown.at("depends_on"));
+      a.where = unknown.at("subsystem");
+    }
+    const json& gap = j.at("gap");
+    if (gap.is_object()) {
+      a.unit = gap.value("unit", "");
+      a.heldout_before = number(gap, "heldout_before");
+      a.heldout_after = number(gap, "heldout_after");
+    }
+  } catch (const json::exception& wrong) {
+    a.failed = std::string("an answer that lacks something: ") + wrong.what();
+  }
+  return a;
+}
+
+/// Share of the power on held-out runs that the answer took away, over the share that the true model would.
+double closed_share(const Truth& t, const Answer& a) {
+  if (a.heldout_before <= 0.0 || t.gap.empty()) return -1.0;
+  const bool pressure = a.unit.find("kg") != std::string::npos || a.unit.find("Pa") != std::string::npos ||
+                        a.unit.find("bar") != std::string::npos;
+  const std::string signal = pressure ? "pressure" : t.signal == "balance" ? "balance" : "torque";
+  const double gap = t.gap.at(signal), noise = t.gap_noise.at(signal);
+  const double possible = gap * gap / (gap * gap + noise * noise);
+  if (possible < 1e-3) return -1.0;  // nothing to close in the signal that the answer speaks of
+  const double left = a.heldout_after / a.heldout_before;
+  return (1.0 - left * left) / possible;
+}
+
+}  // namespace
+
+Case read_case(const std::string& line) {
+  const json j = json::parse(line, nullptr, false);
+  if (j.is_discarded() || !j.contains("label"))
+    throw std::runtime_error("not a line of a results file: " + line.substr(0, 60));
+  Case one;
+  one.truth = read_truth(j["label"]);
+  one.truth.key = j.value("key", "");
+  if (j.contains("answer")) {
+    one.answer = read_answer(j["answer"].get<std::string>());
+    one.answer.seconds = number(j, "seconds");
+    if (number(j, "exit") < -1.5) one.answer.failed = "killed: too slow";
+  } else {
+    one.answer.failed = "not asked";
+  }
+  return one;
+}
+
+Case read_pair(const std::string& label, const std::string& answer) {
+  const json j = json::parse(label, nullptr, false);
+  if (j.is_discarded()) throw std::runtime_error("the label is not JSON");
+  return {read_truth(j), read_answer(answer)};
+}
+
+Judgement judge_case(const Case& one) {
+  const Truth& t = one.truth;
+  const Answer& a = one.answer;
+  Judgement j;
+  if (!a.failed.empty()) return j;
+  std::vector<std::string> ranking;
+  if (!a.effects.empty()) ranking.push_back(a.effects.front());
+  ranking.insert(ranking.end(), a.alternatives.begin(), a.alternatives.end());
+  std::vector<std::string> set = a.effects;
+  for (const std::string& id : a.alternatives)
+    if (!holds(set, id)) set.push_back(id);
+  j.set_size = static_cast<int>(set.size());
+  j.closed = closed_share(t, a);
+  j.left_unnamed = a.verdict == "unknown" && a.effects.empty();
+  const bool one_name = a.verdict == "named" && a.effects.size() == 1 && a.alternatives.empty();
+  j.single_wrong = one_name && !holds(t.ids, a.effects.front()) && a.effects.front() != t.nearest_equal;
+  if (t.kind == "single") {
+    const std::string& truth = t.ids.front();
+    const bool tie = !t.nearest_equal.empty();
+    const bool both = holds(set, truth) && holds(set, t.nearest_equal);
+    j.in_set = tie ? both : holds(set, truth);
+    j.first = tie ? both : !ranking.empty() && ranking.front() == truth;
+    const auto end = ranking.begin() + std::min<std::ptrdiff_t>(3, std::ssize(ranking));
+    j.first_three = tie ? both : std::find(ranking.begin(), end, truth) != end;
+  }
+  if (t.kind == "pair") {
+    j.all_named = holds(a.effects, t.ids[0]) && holds(a.effects, t.ids[1]);
+    j.in_set = holds(set, t.ids[0]) && holds(set, t.ids[1]);
+  }
+  if (t.kind == "unknown") {
+    const bool all = std::all_of(t.depends_on.begin(), t.depends_on.end(),
+                                 [&](const std::string& name) { return holds(a.depends_on, name); });
+    j.right_variables = j.left_unnamed && all && a.depends_on.size() <= t.depends_on.size() + 1;
+  }
+  const std::string subsystem = a.subsystems.empty() ? a.where : a.subsystems.front();
+  if (t.kind == "single" || t.kind == "unknown")
+    j.right_side = !subsystem.empty() && (subsystem == "sensor") == (t.side == "sensor");
+  return j;
+}
+
+}  // namespace blind

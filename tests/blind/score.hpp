@@ -1,0 +1,61 @@
+/// @file
+/// Holds answers of isac-explain against the labels and counts.
+///
+/// Where the oracle says that a rival is less than three sigma from the truth, an answer is right when its set (effects
+/// and alternatives) holds the truth and the nearest rival; a single name earns nothing there.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace blind {
+
+/// What a label says, as far as it is scored.
+struct Truth {
+  std::string key, kind, noise, side, signal;  ///< kind: none, single, pair or unknown
+  double ratio = 0;                            ///< asked for
+  bool testable = true;
+  std::vector<std::string> ids, subsystems, depends_on;
+  std::string nearest_equal;  ///< the nearest rival below three sigma, or empty
+  /// Per signal (torque, pressure, balance): gap that the true model closes on held-out runs, and the noise left.
+  std::map<std::string, double> gap, gap_noise;
+};
+
+/// What an answer says. `failed` is not empty when there is none.
+struct Answer {
+  std::string failed, verdict, where, unit;
+  bool detected = false;
+  std::vector<std::string> effects, alternatives, depends_on;
+  std::vector<double> confidences;      ///< of `effects`
+  std::vector<std::string> subsystems;  ///< of `effects`
+  std::vector<double> p_values;
+  double heldout_before = 0, heldout_after = 0, seconds = 0;  ///< zero when not given
+};
+
+struct Case {
+  Truth truth;
+  Answer answer;
+};
+
+/// One line of a results file of blind_run. Throws std::runtime_error on a line that is none.
+Case read_case(const std::string& line);
+/// A label file and an answer file.
+Case read_pair(const std::string& label, const std::string& answer);
+
+struct Judgement {
+  bool first = false, first_three = false, in_set = false;
+  bool single_wrong = false;  ///< one name, wrong, and nothing says that it might be
+  bool all_named = false;     ///< of two hidden effects both
+  bool left_unnamed = false, right_variables = false, right_side = false;
+  int set_size = 0;
+  double closed =
+      -1;  ///< share of the gap closed on held-out runs, relative to the true model; −1: not known
+};
+
+Judgement judge_case(const Case& one);
+
+/// All tables, as Markdown.
+std::string report(const std::vector<Case>& cases);
+
+}  // namespace blind

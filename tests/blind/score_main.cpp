@@ -1,0 +1,52 @@
+// blind_score: tables from the results of blind_run, or from label and answer files.
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <stdexcept>
+
+#include "score.hpp"
+
+namespace {
+
+constexpr const char* kUsage =
+    "blind_score RESULTS.jsonl [RESULTS.jsonl …]\n"
+    "blind_score --pair LABEL.json ANSWER.json [--pair …]\n"
+    "writes Markdown tables to standard output\n";
+
+std::ifstream open_file(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw std::runtime_error("cannot read " + file);
+  return in;
+}
+
+std::string read_text(const std::string& file) {
+  std::ifstream in = open_file(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+int main(int count, char** words) {
+  std::vector<blind::Case> cases;
+  try {
+    for (int i = 1; i < count; ++i) {
+      if (std::string(words[i]) == "--pair" && i + 2 < count) {
+        cases.push_back(blind::read_pair(read_text(words[i + 1]), read_text(words[i + 2])));
+        i += 2;
+        continue;
+      }
+      std::ifstream in = open_file(words[i]);
+      for (std::string line; std::getline(in, line);)
+        if (!line.empty()) cases.push_back(blind::read_case(line));
+    }
+  } catch (const std::exception& failure) {
+    std::cerr << failure.what() << '\n';
+    return 3;
+  }
+  if (cases.empty()) {
+    std::cerr << kUsage;
+    return 2;
+  }
+  std::cout << blind::report(cases);
+  return 0;
+}
