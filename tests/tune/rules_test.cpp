@@ -1,0 +1,116 @@
+// Row C1, P2: the rules with the seed's numbers (after docs/errata.md), and the tangent of a step.
+#include "isac/tune/rules.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "isac/core/units.hpp"
+#include "isac/tune/linear_step.hpp"
+
+namespace isac::tune {
+namespace {
+
+constexpr double kKg = kPascalPerKgfCm2;
+
+TEST(Rules, ziegler_nichols_gives_the_seeds_gains_after_the_errata) {
+  const auto k = ziegler_nichols({.gain = 1.25, .period = 0.175}, Form::kPid);
+  EXPECT_NEAR(k.proportional, 0.75, 1e-12);
+  EXPECT_NEAR(k.integral, 8.571, 1e-3);  // printed 14.3 is K_P,crit/(0.5 T_crit)
+  EXPECT_NEAR(1.25 / (0.5 * 0.175), 14.3, 0.02);
+  EXPECT_NEAR(k.derivative, 0.01575, 1e-12);  // printed 0.016
+}
+
+TEST(Rules, chien_hrones_reswick_gives_the_seeds_gains_after_the_errata) {
+  // Errata: 6, 133.3, 0.045 from the printed T_L = 0.015, T_A = 0.045, K_J = 0.3.
+  const auto k = chien_hrones_reswick({.latency = 0.015, .adjustment = 0.045}, 0.3, Form::kPid,
+                                      Aim::kReference, Overshoot::kNone);
+  EXPECT_NEAR(k.proportional, 6.0, 1e-12);
+  EXPECT_NEAR(k.integral, 133.33, 0.01);
+  EXPECT_NEAR(k.derivative, 0.045, 1e-12);
+}
+
+TEST(Rules, all_four_variants_follow_the_published_table) {
+  const models::StepShape<double> step{.latency = 1, .adjustment = 10};
+  struct {
+    Aim aim;
+    Overshoot overshoot;
+    double p, pi, ti, pid, tpid, td;
+  } rows[] = {{Aim::kReference, Overshoot::kNone, 3, 3.5, 12, 6, 10, 0.5},
+              {Aim::kReference, Overshoot::kTwentyPercent, 7, 6, 10, 9.5, 13.5, 0.47},
+              {Aim::kDisturbance, Overshoot::kNone, 3, 6, 4, 9.5, 2.4, 0.42},
+              {Aim::kDisturbance, Overshoot::kTwentyPercent, 7, 7, 2.3, 12, 2.0, 0.42}};
+  for (const auto& r : rows) {
+    const auto p = chien_hrones_reswick(step, 1, Form::kP, r.aim, r.overshoot);
+    EXPECT_NEAR(p.proportional, r.p, 1e-12);
+    EXPECT_EQ(p.integral, 0);
+    const auto pi = chien_hrones_reswick(step, 1, Form::kPi, r.aim, r.overshoot);
+    EXPECT_NEAR(pi.proportional, r.pi, 1e-12);
+    EXPECT_NEAR(pi.integral, r.pi / r.ti, 1e-12);
+    const auto pid = chien_hrones_reswick(step, 1, Form::kPid, r.aim, r.overshoot);
+    EXPECT_NEAR(pid.proportional, r.pid, 1e-12);
+    EXPECT_NEAR(pid.integral, r.pid / r.tpid, 1e-12);
+    EXPECT_NEAR(pid.derivative, r.pid * r.td, 1e-12);
+  }
+}
+
+TEST(Rules, tangent_of_the_seeds_joint_has_the_latency_of_the_errata) {
+  // Coefficients as printed in eq 4.7, 0.001 and 0.018; printed are 0.015, 0.045, 0.36.
+  const double tj = std::sqrt(0.001);
+  const auto printed =
+      joint_step_shape({.gain = 0.3, .lag = 0.17, .time_constant = tj, .damping = 0.018 / (2 * tj)});
+  EXPECT_NEAR(printed.latency, 0.0140, 5e-5);
+  EXPECT_NEAR(printed.adjustment, 0.0463, 5e-5);
+  EXPECT_NEAR(printed.latency / printed.adjustment, 0.303, 5e-4);
+  EXPECT_EQ(controllability(printed), Controllability::kFair);
+  // From A, D, r and I as they stand: T_J 0.0317 s, ζ 0.261.
+  LagPlant plant;
+  ASSERT_TRUE(ok(lag_plant(testbed_model(), plant)));
+  const auto joint = joint_step_shape(plant), whole = step_shape(plant);
+  EXPECT_NEAR(joint.latency, 0.01432, 5e-6);
+  EXPECT_NEAR(joint.adjustment, 0.04511, 5e-6);
+  // With the valve unit in front, what a step of Δp commanded shows: T_L/T_A 0.265, easier than the joint alone.
+  EXPECT_NEAR(whole.latency, 0.04164, 5e-6);
+  EXPECT_NEAR(whole.adjustment, 0.15722, 5e-6);
+}
+
+TEST(Rules, tangent_of_the_whole_plant_touches_a_finely_simulated_step) {
+  for (const double damping : {0.1, 0.5, 1.0, 2.5}) {
+    const LagPlant plant{
+        .gain = 2, .lag = 0.17, .time_constant = 0.04, .damping = damping, .dead_time = 0.013};
+    const double h = 1e-5;
+    std::vector<double> command(100000, 1.0);
+    command[0] = 0;
+    const std::vector<double> y = simulate(plant, h, command);
+    std::size_t at = 1;
+    for (std::size_t k = 1; k + 1 < y.size(); ++k)
+      if (y[k + 1] - y[k] > y[at + 1] - y[at]) at = k;
+    const double slope = (y[at + 1] - y[at]) / h,
+                 t = (static_cast<double>(at) - 0.5) * h;  // the step acts from sample 1
+    const auto shape = step_shape(plant);
+    EXPECT_NEAR(shape.adjustment, 2 / slope, 1e-5 * shape.adjustment) << damping;
+    EXPECT_NEAR(shape.latency, t - y[at] / slope, 2e-5) << damping;  // two samples
+  }
+}
+
+TEST(Rules, joint_latency_goes_over_smoothly_from_swinging_to_creeping) {
+  const auto below = joint_step_shape({1, 0.1, 0.04, 0.9999, 0}),
+             above = joint_step_shape({1, 0.1, 0.04, 1.0001, 0});
+  EXPECT_NEAR(below.latency, above.latency, 2e-4 * below.latency);  // ζ itself differs by 2e-4
+  EXPECT_NEAR(below.adjustment, above.adjustment, 5e-4 * below.adjustment);
+}
+
+TEST(LinearStep, answers_are_those_of_the_closed_form_for_a_dead_time_between_samples) {
+  // A joint so fast that it vanishes: 1 − e^(−(t − L)/T).
+  const LagPlant plant{.gain = 1, .lag = 0.2, .time_constant = 1e-5, .damping = 1, .dead_time = 0.0137};
+  std::vector<double> command(300, 1.0);
+  command[0] = 0;
+  const auto y = simulate(plant, 0.01, command);
+  for (std::size_t k = 0; k < y.size(); ++k) {
+    const double t = (static_cast<double>(k) - 1) * 0.01 - plant.dead_time;
+    EXPECT_NEAR(y[k], t > 0 ? 1 - std::exp(-t / 0.2) : 0.0, 2e-4);  // 2 T_J/T: the joint's own lag
+  }
+}
+
+}  // namespace
+}  // namespace isac::tune
