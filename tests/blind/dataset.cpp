@@ -98,7 +98,7 @@ Dataset make_dataset(const Request& request) {
   }
   d.hidden.seed = request.seed;
   if (!d.not_testable.empty()) return d;
-  d.clean = simulate_runs(d.rig, d.runs, d.hidden, 1e-4, true);
+  d.clean = simulate_runs(d.rig, d.runs, d.hidden, kWrittenStep, true);
   d.base = fit_baseline(d.rig, d.runs, d.clean);
   d.gap = gap_of(d.rig, d.base, d.runs, d.clean, false);
   d.heldout_gap = gap_of(d.rig, d.base, d.runs, d.clean, true);

@@ -15,10 +15,10 @@ namespace blind {
 
 struct Request {
   std::uint64_t seed = 1;
-  std::vector<std::string> ids;  ///< empty: nothing is hidden
-  double ratio = 0.75;           ///< gap left by the refitted base model over the noise floor
+  std::vector<std::string> ids = {};  ///< empty: nothing is hidden
+  double ratio = 0.75;                ///< gap left by the refitted base model over the noise floor
   std::string noise = "white";
-  std::filesystem::path recordings;  ///< of `real` noise
+  std::filesystem::path recordings = {};  ///< of `real` noise
 };
 
 /// One hidden effect at its strength.

@@ -80,7 +80,12 @@ std::string label_of(const Dataset& d, const Gap& noise, const Verdict* oracle) 
   if (oracle == nullptr) {
     json.key("oracle").null();
   } else {
-    json.key("oracle").open('{').field("none", oracle->none).key("rivals").open('{');
+    json.key("oracle")
+        .open('{')
+        .field("self", oracle->self)
+        .field("none", oracle->none)
+        .key("rivals")
+        .open('{');
     for (const auto& [id, sigma] : oracle->rivals) json.field(id, sigma);
     json.close('}').list("class", oracle->equals).close('}');
   }

@@ -66,7 +66,10 @@ class Oracle {
         d.noise.recorded_pressure.empty() ? Colour{1.0 / kBlock, 0, 0} : colour_of(d.noise.recorded_pressure);
     const Baseline truth{d.rig.A, d.rig.B, d.rig.C, d.rig.D, d.rig.K_C, d.rig.T_C};
     still_ = stacked(truth, simulated(Hidden{}));
-    truth_ = stacked(d.base, d.clean);
+    // What the integrator and the derivative leave at the truth's own step is no part of the effect.
+    truth_ = stacked(truth, d.clean);
+    const Column plain = stacked(truth, simulated(Hidden{}, kWrittenStep));
+    for (std::size_t k = 0; k < truth_.size(); ++k) truth_[k] -= plain[k];
     sensitivities();
     for (const Hiding& hiding : d.hidings)
       true_columns_.push_back(response(*hiding.effect, hiding.amplitude, hiding.shape));
@@ -75,6 +78,9 @@ class Oracle {
   Verdict verdict() {
     Verdict v;
     v.none = distance({});
+    std::vector<const Column*> truth;
+    for (const Column& column : true_columns_) truth.push_back(&column);
+    v.self = distance(truth);
     Random random(d_.request.seed ^ 0xa0761d6478bd642full);
     for (const Effect& rival : effects()) {
       if (!rival.catalogued || hidden(rival.id)) continue;
@@ -98,10 +104,10 @@ class Oracle {
                        [&](const Hiding& h) { return h.effect->id == id; });
   }
 
-  [[nodiscard]] std::vector<Signals> simulated(const Hidden& hidden) const {
+  [[nodiscard]] std::vector<Signals> simulated(const Hidden& hidden, double step = kStep) const {
     std::vector<Signals> signals(d_.runs.size());
     for (std::size_t i = 0; i < d_.runs.size(); ++i)
-      if (!d_.runs[i].heldout) signals[i] = simulate(d_.rig, d_.runs[i], hidden, kStep);
+      if (!d_.runs[i].heldout) signals[i] = simulate(d_.rig, d_.runs[i], hidden, step);
     return signals;
   }
 
@@ -276,10 +282,18 @@ class Oracle {
     Shape one = rival.draw(random);
     if (one.contains("sign")) one["sign"] = 1.0;
     if (one.empty() || (one.size() == 1 && one.contains("sign"))) return {one};
-    std::vector<Shape> shapes;
+    // Fifteen draws, of which the two ends and the middle of what shapes it most are tried.
+    std::vector<Shape> draws;
+    for (int i = 0; i < 15; ++i) draws.push_back(rival.draw(random));
+    for (const char* name : {"v_s", "phi_s", "tau", "phi_e", "n", "phi0", "f", "N", "t"}) {
+      if (!one.contains(name)) continue;
+      std::sort(draws.begin(), draws.end(),
+                [&](const Shape& a, const Shape& b) { return a.at(name) < b.at(name); });
+      break;
+    }
+    std::vector<Shape> shapes = {draws[0], draws[7], draws[14]};
     for (int i = 0; i < 3; ++i) {
-      shapes.push_back(rival.draw(random));
-      Shape& shape = shapes.back();
+      Shape& shape = shapes[static_cast<std::size_t>(i)];
       if (shape.contains("sign")) shape["sign"] = 1.0;
       if (shape.contains("sensor")) shape["sensor"] = 1.0 + i % 2;
       if (shape.contains("of_B")) shape["of_B"] = i % 2;
@@ -288,39 +302,54 @@ class Oracle {
     return shapes;
   }
 
+  struct Try {
+    double sigma;
+    Column column;
+    Shape shape;
+  };
+
+  /// The rival with this shape, its amplitude sought: the response is linear in it only nearby.
+  [[nodiscard]] Try with_shape(const Effect& rival, Shape shape, const std::vector<const Column*>& fixed,
+                               double alone) const {
+    Try best{alone, {}, shape};
+    double amplitude = rival.typical;
+    for (int round = 0; round < 3; ++round) {
+      Column column = response(rival, amplitude, shape);
+      std::vector<const Column*> extra = fixed;
+      extra.push_back(&column);
+      std::vector<double> weights;
+      const double sigma = distance(extra, &weights), weight = weights.back();
+      const bool allowed = weight > 0.0 || shape.contains("sign");
+      if (allowed && sigma < best.sigma) best = {sigma, std::move(column), shape};
+      if (!allowed || sigma > std::max(2.0 * kNear, 0.5 * alone) || std::abs(weight - 1.0) < 0.1) break;
+      if (weight < 0.0) shape["sign"] = -shape["sign"];
+      const double next = std::clamp(amplitude * std::abs(weight), rival.typical * 1e-3, rival.largest);
+      if (std::abs(next / amplitude - 1.0) < 0.05) break;
+      amplitude = next;
+    }
+    return best;
+  }
+
   double nearest_of(const Effect& rival, const std::vector<Column>& kept, Random& random) const {
     std::vector<const Column*> fixed;
     for (const Column& column : kept) fixed.push_back(&column);
     const double alone = distance(fixed);
-    struct Try {
-      double sigma;
-      Column column;
-    };
     std::vector<Try> tries;
-    for (Shape shape : shapes_of(rival, random)) {
-      const bool signed_effect = shape.contains("sign");
-      double amplitude = rival.typical;
-      Try best{alone, {}};
-      for (int round = 0; round < 3; ++round) {
-        Column column = response(rival, amplitude, shape);
-        std::vector<const Column*> extra = fixed;
-        extra.push_back(&column);
-        std::vector<double> weights;
-        const double sigma = distance(extra, &weights);
-        const double weight = weights.back();
-        const bool allowed = weight > 0.0 || signed_effect;
-        if (allowed && sigma < best.sigma) best = {sigma, std::move(column)};
-        if (!allowed || sigma > std::max(2.0 * kNear, 0.5 * alone) || std::abs(weight - 1.0) < 0.1) break;
-        if (weight < 0.0) shape["sign"] = -shape["sign"];
-        const double next = std::clamp(amplitude * std::abs(weight), rival.typical * 1e-3, rival.largest);
-        if (std::abs(next / amplitude - 1.0) < 0.05) break;
-        amplitude = next;
-      }
-      if (!best.column.empty()) tries.push_back(std::move(best));
-    }
+    const auto take = [&](const Shape& shape) {
+      if (Try one = with_shape(rival, shape, fixed, alone); !one.column.empty())
+        tries.push_back(std::move(one));
+      std::sort(tries.begin(), tries.end(), [](const Try& a, const Try& b) { return a.sigma < b.sigma; });
+    };
+    for (const Shape& shape : shapes_of(rival, random)) take(shape);
     if (tries.empty()) return alone;
-    std::sort(tries.begin(), tries.end(), [](const Try& a, const Try& b) { return a.sigma < b.sigma; });
     if (tries.size() == 1) return tries[0].sigma;
+    if (tries[0].sigma < 0.8 * alone) {
+      Shape middle = tries[0].shape;
+      for (auto& [name, value] : middle)
+        if (name != "sign" && name != "sensor" && name != "of_B" && name != "side" && name != "N")
+          value = 0.5 * (value + tries[1].shape.at(name));
+      take(middle);
+    }
     // Two shapes together stand for those between them.
     fixed.push_back(&tries[0].column);
     fixed.push_back(&tries[1].column);

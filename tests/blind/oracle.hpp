@@ -19,6 +19,7 @@
 namespace blind {
 
 struct Verdict {
+  double self = 0;  ///< what the truth's own linear response leaves: the oracle's own error
   double none = 0;  ///< sigma between the truth and the base model alone
   std::map<std::string, double>
       rivals;  ///< by id; of two hidden effects the one that is more easily swapped for it

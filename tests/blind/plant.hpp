@@ -8,7 +8,9 @@
 
 namespace blind {
 
-/// `step` divides a row's 2 ms; 1e-4 s for what is written, coarser while a strength is being sought.
-Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, double step = 1e-4);
+inline constexpr double kWrittenStep = 1e-4;  ///< s, of the integrator for what is written
+
+/// `step` divides a row's 2 ms; coarser while a strength is being sought.
+Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, double step = kWrittenStep);
 
 }  // namespace blind

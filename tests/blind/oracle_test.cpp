@@ -1,0 +1,41 @@
+#include "oracle.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace blind {
+namespace {
+
+TEST(Oracle, ties_added_inertia_with_the_gain_of_the_encoder_and_with_nothing_of_the_valves) {
+  const Verdict v = judge(make_dataset({.seed = 1, .ids = {"inertia_error"}, .ratio = 0.25}));
+  EXPECT_LT(v.self, 1.0);  // an oracle that cannot see its own truth is blind
+  EXPECT_GT(v.none, 10.0);
+  // Added inertia and a gain of the encoder change the balance alike but for the stiffness that the gain also changes.
+  EXPECT_LT(v.rivals.at("encoder_gain"), 0.3 * v.none);
+  for (const char* id : {"dead_time", "leak", "pressure_gain_error"})
+    EXPECT_GT(v.rivals.at(id), 0.9 * v.none) << id;
+  for (const std::string& id : v.equals) EXPECT_LT(v.rivals.at(id), 3.0);
+}
+
+TEST(Oracle, tells_friction_from_its_rivals_when_it_is_clear) {
+  const Verdict v = judge(make_dataset({.seed = 1, .ids = {"coulomb_friction"}}));
+  EXPECT_LT(v.self, 1.0);
+  EXPECT_TRUE(v.equals.empty());
+  EXPECT_EQ(v.rivals.count("coulomb_friction"), 0u) << "the truth is no rival of itself";
+  // Friction that grows with pressure is nearer than anything that is no friction.
+  EXPECT_LT(v.rivals.at("pressure_dependent_friction"), v.rivals.at("hysteresis"));
+  EXPECT_LT(v.rivals.at("hysteresis"), v.rivals.at("cubic_stiffness"));
+}
+
+TEST(Oracle, counts_more_sigma_the_stronger_the_effect) {
+  const auto at = [](double ratio) {
+    return judge(make_dataset({.seed = 2, .ids = {"torque_offset"}, .ratio = ratio, .noise = "coloured"}));
+  };
+  const Verdict faint = at(0.25), clear = at(0.75);
+  EXPECT_NEAR(clear.none / faint.none, 3.0, 0.3);  // the ratios hold within 3 % each, the effect is linear
+  EXPECT_LT(faint.rivals.at("encoder_offset"), faint.none);
+}
+
+}  // namespace
+}  // namespace blind

@@ -1,0 +1,142 @@
+#include "score.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace blind {
+namespace {
+
+Case single(const std::string& truth) {
+  Case one;
+  one.truth.kind = "single";
+  one.truth.noise = "white";
+  one.truth.side = "process";
+  one.truth.signal = "torque";
+  one.truth.ratio = 0.75;
+  one.truth.ids = {truth};
+  one.truth.gap = {{"torque", 0.01}, {"pressure", 0.0}, {"balance", 0.0}};
+  one.truth.gap_noise = {{"torque", 0.02}, {"pressure", 0.004}, {"balance", 0.01}};
+  return one;
+}
+
+Answer named(std::vector<std::string> effects, std::vector<std::string> alternatives = {}) {
+  Answer a;
+  a.verdict = alternatives.empty() ? "named" : "not_separable";
+  a.detected = true;
+  a.confidences.assign(effects.size(), 0.9);
+  a.subsystems.assign(effects.size(), "muscle");
+  a.effects = std::move(effects);
+  a.alternatives = std::move(alternatives);
+  return a;
+}
+
+TEST(Score, credits_the_name_that_is_right) {
+  Case one = single("creep");
+  one.answer = named({"creep"});
+  const Judgement j = judge_case(one);
+  EXPECT_TRUE(j.first && j.first_three && j.in_set && j.right_side);
+  EXPECT_FALSE(j.single_wrong);
+  EXPECT_EQ(j.set_size, 1);
+}
+
+TEST(Score, counts_a_single_wrong_name_but_not_one_with_alternatives) {
+  Case one = single("creep");
+  one.answer = named({"hysteresis"});
+  EXPECT_TRUE(judge_case(one).single_wrong);
+  one.answer = named({"hysteresis"}, {"creep"});
+  const Judgement j = judge_case(one);
+  EXPECT_FALSE(j.single_wrong);
+  EXPECT_FALSE(j.first);
+  EXPECT_TRUE(j.first_three && j.in_set);
+  EXPECT_EQ(j.set_size, 2);
+}
+
+TEST(Score, gives_nothing_for_a_single_name_where_the_oracle_says_that_two_cannot_be_told_apart) {
+  Case one = single("inertia_error");
+  one.truth.nearest_equal = "encoder_gain";
+  one.answer = named({"inertia_error"});
+  Judgement j = judge_case(one);
+  EXPECT_FALSE(j.first || j.first_three || j.in_set);
+  one.answer = named({"encoder_gain"}, {"inertia_error"});
+  j = judge_case(one);
+  EXPECT_TRUE(j.first && j.first_three && j.in_set);
+}
+
+TEST(Score, wants_an_unknown_effect_left_unnamed_with_its_variables) {
+  Case one = single("angle_friction");
+  one.truth.kind = "unknown";
+  one.truth.depends_on = {"velocity", "angle"};
+  one.answer.verdict = "unknown";
+  one.answer.detected = true;
+  one.answer.depends_on = {"angle", "velocity"};
+  EXPECT_TRUE(judge_case(one).left_unnamed);
+  EXPECT_TRUE(judge_case(one).right_variables);
+  one.answer.depends_on = {"angle"};
+  EXPECT_FALSE(judge_case(one).right_variables);
+  one.answer.depends_on = {"angle", "velocity", "p1", "p2"};
+  EXPECT_FALSE(judge_case(one).right_variables) << "naming everything is no answer";
+  one.answer = named({"coulomb_friction"});
+  EXPECT_TRUE(judge_case(one).single_wrong);
+}
+
+TEST(Score, wants_both_of_two_effects) {
+  Case one = single("creep");
+  one.truth.kind = "pair";
+  one.truth.ids = {"creep", "leak"};
+  one.answer = named({"leak", "creep"});
+  EXPECT_TRUE(judge_case(one).all_named);
+  one.answer = named({"leak"}, {"creep"});
+  EXPECT_FALSE(judge_case(one).all_named);
+  EXPECT_TRUE(judge_case(one).in_set);
+}
+
+TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
+  Case one = single("creep");
+  one.answer = named({"creep"});
+  one.answer.unit = "N m";
+  one.answer.heldout_before = std::sqrt(0.01 * 0.01 + 0.02 * 0.02);
+  one.answer.heldout_after = 0.02;  // down to the noise: all of it
+  EXPECT_NEAR(judge_case(one).closed, 1.0, 1e-12);
+  one.answer.heldout_after = one.answer.heldout_before;
+  EXPECT_NEAR(judge_case(one).closed, 0.0, 1e-12);
+}
+
+TEST(Score, reads_a_line_of_results_and_survives_an_answer_that_is_none) {
+  const std::string label =
+      R"({"schema":"isac.blind/1","kind":"single","noise":"white","side":"process","signal":"torque",)"
+      R"("ratio_asked":0.75,"testable":true,"ids":["creep"],"subsystems":["muscle"],"depends_on":[],)"
+      R"("gap":{"torque":{"heldout_before":0.01,"heldout_noise":0.02}},)"
+      R"("oracle":{"none":9,"rivals":{"leak":9.1,"hysteresis":1.5,"coulomb_friction":2.5}}})";
+  const Case one = read_case(R"({"key":"k","label":)" + label +
+                             R"(,"exit":0,"seconds":1.5,"answer":"Segmentation fault"})");
+  EXPECT_EQ(one.truth.nearest_equal, "hysteresis");
+  EXPECT_FALSE(one.answer.failed.empty());
+  EXPECT_NE(report({one}).find("without an answer: 1"), std::string::npos);
+  EXPECT_THROW(read_case("nonsense"), std::runtime_error);
+}
+
+TEST(Score, puts_confidences_against_what_came_true) {
+  std::vector<Case> cases;
+  for (int i = 0; i < 10; ++i) {
+    cases.push_back(single("creep"));
+    cases.back().answer = named({i < 9 ? "creep" : "leak"});
+  }
+  // Nine of ten right at a stated 0.9: no error.
+  EXPECT_NE(report(cases).find("Expected calibration error: 0.000"), std::string::npos);
+}
+
+TEST(Score, counts_false_alarms_by_kind_of_noise) {
+  std::vector<Case> cases(4);
+  for (int i = 0; i < 4; ++i) {
+    Case& one = cases[static_cast<std::size_t>(i)];
+    one.truth.kind = "none";
+    one.truth.noise = "coloured";
+    one.answer.verdict = "none";
+    if (i == 0) one.answer = named({"creep"});
+  }
+  EXPECT_NE(report(cases).find("| coloured | 3/4 = 75.0 %"), std::string::npos) << report(cases);
+}
+
+}  // namespace
+}  // namespace blind
