@@ -37,6 +37,12 @@ std::string dump(const Json& json) {
 
 }  // namespace
 
+Json json_parameters(const std::vector<Estimated>& parameters) {
+  Json out = Json::object();
+  for (const Estimated& estimate : parameters) out[estimate.name] = parameter(estimate);
+  return out;
+}
+
 std::string format_answer(const Answer& answer) {
   return format_answer(answer, Json::object());
 }
@@ -44,8 +50,7 @@ std::string format_answer(const Answer& answer) {
 std::string format_answer(const Answer& answer, const Json& extra) {
   Json out;
   out["schema"] = answer.schema;
-  out["parameters"] = Json::object();
-  for (const Estimated& estimate : answer.parameters) out["parameters"][estimate.name] = parameter(estimate);
+  out["parameters"] = json_parameters(answer.parameters);
   out["fit"] = {{"rmse", number(answer.fit.rmse)},
                 {"unit", answer.fit.unit},
                 {"nrmse", number(answer.fit.nrmse)},

@@ -34,6 +34,9 @@ struct Answer {
 [[nodiscard]] std::string format_answer(const Answer& answer);
 [[nodiscard]] std::string format_answer(const Answer& answer, const nlohmann::ordered_json& extra);
 
+/// {"A":{"value":…,"unit":…,"std_error":…,"ci95":[…],"identifiable":true},…}, as under "parameters".
+[[nodiscard]] nlohmann::ordered_json json_parameters(const std::vector<Estimated>& parameters);
+
 /// {"error":{"code":…,"text":…,"file":…,"line":…,"column":…}}; unknown places are null.
 [[nodiscard]] std::string format_error(const Error& error);
 
