@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "isac/card/card.hpp"
+#include "isac/card/comedi_card.hpp"
 #include "isac/card/replay_card.hpp"
 #include "isac/card/sim_card.hpp"
 #include "isac/card/sim_options.hpp"
@@ -31,6 +32,8 @@ constexpr std::array kBackEnds{
               }
               return open_replay(rest);
             }},
+    BackEnd{"comedi", "comedi:TABLE.toml  hardware through Comedi, by a table of signals (data/cards)",
+            [](std::string_view rest) { return open_comedi(rest); }},
 };
 
 }  // namespace

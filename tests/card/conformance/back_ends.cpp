@@ -4,6 +4,9 @@
 #include <memory>
 #include <ostream>
 
+#ifdef ISAC_HAVE_COMEDI
+#include "../comedi_fake.hpp"
+#endif
 #include "isac/card/calibration.hpp"
 #include "isac/card/replay_card.hpp"
 #include "isac/card/sim_card.hpp"
@@ -46,6 +49,22 @@ UnderTest open_replayed(bool raw) {
   return test;
 }
 
+#ifdef ISAC_HAVE_COMEDI
+/// A table of data/cards on fake boards; the valves are looked at behind the card's back.
+UnderTest open_fake_comedi(const std::string& name, const FakeBoard& first, const FakeBoard& second,
+                           const char* valves, int subdevice) {
+  boards().clear();
+  add_board("/dev/comedi0", first);
+  add_board("/dev/comedi1", second);
+  UnderTest test;
+  test.opened = card::open_comedi(
+      card::read_signal_table(std::string(ISAC_SOURCE_DIR) + "/data/cards/" + name + ".toml"),
+      std::make_unique<FakeClock>());
+  test.vented = [valves, subdevice] { return boards().at(valves).closed(subdevice); };
+  return test;
+}
+#endif
+
 }  // namespace
 
 std::ostream& operator<<(std::ostream& out, const BackEnd& back_end) {
@@ -63,6 +82,14 @@ std::vector<BackEnd> back_ends() {
        }},
       {"replay_of_codes", true, [] { return open_replayed(true); }},
       {"replay_of_physical_columns", true, [] { return open_replayed(false); }},
+#ifdef ISAC_HAVE_COMEDI
+      {"comedi_testbed", false,
+       [] { return open_fake_comedi("testbed", controller_board(), labpc_board(), "/dev/comedi0", 1); }},
+      {"comedi_soft_arm", false,
+       [] { return open_fake_comedi("soft_arm", controller_board(), labpc_board(), "/dev/comedi0", 1); }},
+      {"comedi_s626_and_pci1724", false,
+       [] { return open_fake_comedi("s626_pci1724", s626_board(), pci1724_board(), "/dev/comedi1", 0); }},
+#endif
   };
 }
 
