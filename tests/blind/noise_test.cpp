@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
 namespace blind {
@@ -120,18 +119,6 @@ TEST(Noise, lets_the_encoder_read_the_middle_of_the_step_it_is_in) {
 TEST(Noise, refuses_a_kind_that_it_does_not_know) {
   Random random(1);
   EXPECT_THROW(draw_noise("pink", Rig{}, random, {}), std::invalid_argument);
-}
-
-TEST(NoiseReal, keeps_the_memory_of_the_recording_it_is_taken_from) {
-  const char* folder = std::getenv("ISAC_REAL_DATA");
-  if (folder == nullptr) GTEST_SKIP() << "set ISAC_REAL_DATA to the folder of measured recordings";
-  Random random(4);
-  const Noise noise = draw_noise("real", Rig{}, random, folder);
-  EXPECT_NEAR(covariance(noise.recorded_force, 0), 1.0, 0.05);  // outliers are held at six
-  const std::vector<double> drawn = block_bootstrap(noise.recorded_force, 200000, 250, random);
-  // Blocks of 250 rows break one pair of neighbours in 250.
-  EXPECT_NEAR(covariance(drawn, 1) / covariance(drawn, 0),
-              covariance(noise.recorded_force, 1) / covariance(noise.recorded_force, 0), 0.06);
 }
 
 }  // namespace

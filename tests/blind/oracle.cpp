@@ -277,6 +277,16 @@ class Oracle {
     return std::sqrt(sum);
   }
 
+  /// An asymmetry is more on one side or on the other; between the two it is none, and another effect's name.
+  static bool two_sided(const Shape& shape) { return shape.contains("phi_s_ratio"); }
+  static bool same_side(const Shape& a, const Shape& b) {
+    return !two_sided(a) || (a.at("ratio") > 1.0) == (b.at("ratio") > 1.0);
+  }
+  static Shape mirrored(Shape shape) {
+    shape["ratio"] = 1.0 / shape["ratio"];
+    return shape;
+  }
+
   /// The shapes that are tried: both sensors, and a few draws of what is continuous.
   static std::vector<Shape> shapes_of(const Effect& rival, Random& random) {
     Shape one = rival.draw(random);
@@ -292,7 +302,8 @@ class Oracle {
       break;
     }
     std::vector<Shape> shapes = {draws[0], draws[7], draws[14]};
-    for (int i = 0; i < 3; ++i) {
+    if (two_sided(one)) shapes = {draws[0], draws[14], mirrored(draws[0]), mirrored(draws[14])};
+    for (int i = 0; i < static_cast<int>(shapes.size()); ++i) {
       Shape& shape = shapes[static_cast<std::size_t>(i)];
       if (shape.contains("sign")) shape["sign"] = 1.0;
       if (shape.contains("sensor")) shape["sensor"] = 1.0 + i % 2;
@@ -343,17 +354,22 @@ class Oracle {
     for (const Shape& shape : shapes_of(rival, random)) take(shape);
     if (tries.empty()) return alone;
     if (tries.size() == 1) return tries[0].sigma;
-    if (tries[0].sigma < 0.8 * alone) {
+    if (tries[0].sigma < 0.8 * alone && same_side(tries[0].shape, tries[1].shape)) {
       Shape middle = tries[0].shape;
       for (auto& [name, value] : middle)
         if (name != "sign" && name != "sensor" && name != "of_B" && name != "side" && name != "N")
           value = 0.5 * (value + tries[1].shape.at(name));
       take(middle);
     }
-    // Two shapes together stand for those between them.
+    if (!same_side(tries[0].shape, tries[1].shape)) return tries[0].sigma;
+    // Two shapes together, neither against the other, stand for those between them.
     fixed.push_back(&tries[0].column);
     fixed.push_back(&tries[1].column);
-    return std::min(tries[0].sigma, distance(fixed));
+    std::vector<double> weights;
+    const double together = distance(fixed, &weights);
+    const std::size_t last = weights.size() - 1;
+    if (weights[last] * weights[last - 1] < 0.0) return tries[0].sigma;
+    return std::min(tries[0].sigma, together);
   }
 
   const Dataset& d_;

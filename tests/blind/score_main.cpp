@@ -36,8 +36,14 @@ int main(int count, char** words) {
         continue;
       }
       std::ifstream in = open_file(words[i]);
-      for (std::string line; std::getline(in, line);)
-        if (!line.empty()) cases.push_back(blind::read_case(line));
+      for (std::string line; std::getline(in, line);) {
+        if (line.empty()) continue;
+        // A run that was stopped leaves a line that was cut off; blind_run does that dataset again.
+        if (line.back() == '}')
+          cases.push_back(blind::read_case(line));
+        else
+          std::cerr << words[i] << ": a line that was cut off is left out\n";
+      }
     }
   } catch (const std::exception& failure) {
     std::cerr << failure.what() << '\n';

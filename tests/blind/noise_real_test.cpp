@@ -1,0 +1,29 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "noise.hpp"
+
+namespace blind {
+namespace {
+
+double covariance(const std::vector<double>& x, std::size_t lag) {
+  double sum = 0.0;
+  for (std::size_t k = lag; k < x.size(); ++k) sum += x[k] * x[k - lag];
+  return sum / static_cast<double>(x.size() - lag);
+}
+
+TEST(NoiseReal, keeps_the_memory_of_the_recording_it_is_taken_from) {
+  const char* folder = std::getenv("ISAC_REAL_DATA");
+  if (folder == nullptr) GTEST_SKIP() << "set ISAC_REAL_DATA to the folder of measured recordings";
+  Random random(4);
+  const Noise noise = draw_noise("real", Rig{}, random, folder);
+  EXPECT_NEAR(covariance(noise.recorded_force, 0), 1.0, 0.05);  // outliers are held at six
+  const std::vector<double> drawn = block_bootstrap(noise.recorded_force, 200000, 250, random);
+  // Blocks of 250 rows break one pair of neighbours in 250.
+  EXPECT_NEAR(covariance(drawn, 1) / covariance(drawn, 0),
+              covariance(noise.recorded_force, 1) / covariance(noise.recorded_force, 0), 0.06);
+}
+
+}  // namespace
+}  // namespace blind

@@ -1,0 +1,110 @@
+// The three programs as a user runs them, with a script in the place of isac-explain.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+namespace blind {
+namespace {
+
+class Programs : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string pattern = (std::filesystem::temp_directory_path() / "blind-programs-XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// The exit code; what was said stands in the file `said`.
+  int run(const std::string& words) {
+    const std::string line =
+        std::string(ISAC_BIN_DIR) + "/" + words + " > " + path("said") + " 2> " + path("complaint");
+    const int status = std::system(line.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  [[nodiscard]] std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  std::string script(const std::string& name, const std::string& body) {
+    std::ofstream(path(name)) << "#!/bin/sh\n" << body << "\n";
+    std::filesystem::permissions(path(name), std::filesystem::perms::owner_all);
+    return path(name);
+  }
+  [[nodiscard]] std::string text(const std::string& name) const {
+    std::ifstream in(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  [[nodiscard]] std::vector<std::string> lines(const std::string& name) const {
+    std::ifstream in(path(name));
+    std::vector<std::string> all;
+    for (std::string line; std::getline(in, line);) all.push_back(line);
+    return all;
+  }
+
+  /// Says that nothing is missing, and keeps the words it was called with.
+  std::string contented() {
+    return script(
+        "contented",
+        "echo \"$@\" >> " + path("calls") + "\ntest -f \"$1/rig.toml\" || exit 3\n" +
+            R"(echo '{"schema":"isac.explain/1","verdict":"none","disagreement":{"detected":false,)"
+            R"("signals":[{"signal":"torque","rmse":0.01,"noise_floor":0.01,"p_value":0.4}],"where":[]},"effects":[],)"
+            R"("alternatives":[],"unknown":null,"not_testable":[],"could_hide":[],"next_experiment":null,"gap":null}')");
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(Programs, judge_every_dataset_once_and_go_on_where_they_stopped) {
+  const std::string call = "blind_run --results " + path("results") + " --explain " + contented() +
+                           " --tier none --noise white --count ";
+  ASSERT_EQ(run(call + "2 --jobs 2"), 0) << text("complaint");
+  EXPECT_EQ(lines("results").size(), 2u);
+  // A line that was cut off is done again.
+  std::ofstream(path("results"), std::ios::app) << R"({"key":"none/white//1.2","label":{)";
+  ASSERT_EQ(run(call + "3"), 0) << text("complaint");
+  EXPECT_EQ(lines("results").size(), 4u);
+  EXPECT_EQ(lines("calls").size(), 3u);
+  ASSERT_EQ(run("blind_score " + path("results")), 0) << text("complaint");
+  EXPECT_NE(text("said").find("| white | 3/3 = 100.0 %"), std::string::npos) << text("said");
+  EXPECT_FALSE(std::filesystem::exists(lines("calls")[0].substr(0, lines("calls")[0].find(' '))))
+      << "datasets are removed";
+}
+
+TEST_F(Programs, hand_on_what_is_hidden_and_make_tables_of_the_answers) {
+  const std::string results = path("results");
+  ASSERT_EQ(run("blind_run --results " + results + " --explain " + contented() +
+                " --tier clear --effect leak --noise coloured -- --without {ids}"),
+            0)
+      << text("complaint");
+  EXPECT_NE(text("calls").find("--json - --without leak"), std::string::npos) << text("calls");
+  ASSERT_EQ(run("blind_score " + results), 0) << text("complaint");
+  EXPECT_NE(text("said").find("| leak | 1 | 0 | (none) (1) |"), std::string::npos) << text("said");
+}
+
+TEST_F(Programs, end_an_answer_that_takes_too_long) {
+  ASSERT_EQ(run("blind_run --results " + path("results") + " --explain " + script("slow", "exec sleep 60") +
+                " --tier none --noise white --timeout 0.3"),
+            0);
+  ASSERT_EQ(run("blind_score " + path("results")), 0);
+  EXPECT_NE(text("said").find("without an answer: 1 (killed: too slow)"), std::string::npos) << text("said");
+}
+
+TEST_F(Programs, say_by_their_exit_code_what_went_wrong) {
+  const std::string call = "blind_generate --out " + path("dataset") + " --label " + path("label");
+  EXPECT_EQ(run(call + " --effect viscous_damping"), 1);
+  EXPECT_FALSE(std::filesystem::exists(path("dataset"))) << "nothing is hidden, so nothing is written";
+  EXPECT_NE(text("label").find(R"("testable":false)"), std::string::npos);
+  EXPECT_EQ(run(call + " --effect gremlins"), 2);
+  EXPECT_NE(text("complaint").find("gremlins"), std::string::npos);
+  EXPECT_EQ(run(call + " --ratio"), 2);
+  EXPECT_EQ(run("blind_score " + path("nowhere")), 3);
+}
+
+}  // namespace
+}  // namespace blind
