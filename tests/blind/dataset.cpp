@@ -52,7 +52,7 @@ Hiding hide(const Effect& effect, const Shape& shape, const Dataset& dataset, do
   Hiding hiding{&effect, effect.typical, shape, 0.0, ""};
   double low = 0.0, low_ratio = 0.0, high = 0.0, high_ratio = 0.0;  // brackets, high 0: none yet
   double a = effect.typical;
-  for (int i = 0; i < 14; ++i) {
+  for (int i = 0; i < 24; ++i) {
     const Strength s = reached(a);
     hiding.amplitude = a;
     hiding.ratio = s.ratio;
@@ -73,7 +73,7 @@ Hiding hide(const Effect& effect, const Shape& shape, const Dataset& dataset, do
     } else {
       // The secant, kept away from the ends of the bracket.
       const double share = (ratio - low_ratio) / (high_ratio - low_ratio);
-      a = low + (high - low) * std::clamp(share, i % 3 == 2 ? 0.4 : 0.05, i % 3 == 2 ? 0.6 : 0.95);
+      a = low + (high - low) * std::clamp(share, i % 3 == 2 ? 0.45 : 0.05, i % 3 == 2 ? 0.55 : 0.95);
     }
   }
   return hiding;
