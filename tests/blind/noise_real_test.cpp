@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "noise.hpp"
+#include "oracle.hpp"
 
 namespace blind {
 namespace {
@@ -23,6 +24,17 @@ TEST(NoiseReal, keeps_the_memory_of_the_recording_it_is_taken_from) {
   // Blocks of 250 rows break one pair of neighbours in 250.
   EXPECT_NEAR(covariance(drawn, 1) / covariance(drawn, 0),
               covariance(noise.recorded_force, 1) / covariance(noise.recorded_force, 0), 0.06);
+}
+
+TEST(NoiseReal, is_weighed_by_the_oracle_with_the_memory_it_has) {
+  const char* folder = std::getenv("ISAC_REAL_DATA");
+  if (folder == nullptr) GTEST_SKIP() << "set ISAC_REAL_DATA to the folder of measured recordings";
+  const Dataset d = make_dataset({.seed = 17, .noise = "real", .recordings = folder});
+  Random random(3);
+  std::vector<Signals> noisy;
+  for (const Signals& clean : d.clean) noisy.push_back(add_noise(clean, d.noise, d.rig, random));
+  // White and one memory are a rough picture of a recorded noise: 15 % of sigma².
+  EXPECT_NEAR(whitened_noise(d, noisy), 1.0, 0.15);
 }
 
 }  // namespace

@@ -61,9 +61,7 @@ Colour colour_of(const std::vector<double>& recorded) {
 class Oracle {
  public:
   explicit Oracle(const Dataset& d) : d_(d) {
-    force_ = d.noise.recorded_force.empty() ? Colour{1.0 / kBlock, 0, 0} : colour_of(d.noise.recorded_force);
-    pressure_ =
-        d.noise.recorded_pressure.empty() ? Colour{1.0 / kBlock, 0, 0} : colour_of(d.noise.recorded_pressure);
+    read_noise();
     const Baseline truth{d.rig.A, d.rig.B, d.rig.C, d.rig.D, d.rig.K_C, d.rig.T_C};
     still_ = stacked(truth, simulated(Hidden{}));
     // What the integrator and the derivative leave at the truth's own step is no part of the effect.
@@ -73,6 +71,19 @@ class Oracle {
     sensitivities();
     for (const Hiding& hiding : d.hidings)
       true_columns_.push_back(response(*hiding.effect, hiding.amplitude, hiding.shape));
+  }
+
+  /// Only the noise model is wanted of this one.
+  struct NoiseOnly {};
+  Oracle(const Dataset& d, NoiseOnly) : d_(d) { read_noise(); }
+
+  [[nodiscard]] double whitened_noise(std::vector<Signals> noisy) const {
+    for (std::size_t i = 0; i < noisy.size(); ++i)
+      if (!d_.runs[i].free) noisy[i].angle = d_.clean[i].angle;
+    const std::vector<double> with = stacked(d_.base, noisy), without = stacked(d_.base, d_.clean);
+    double sum = 0.0;
+    for (std::size_t k = 0; k < with.size(); ++k) sum += (with[k] - without[k]) * (with[k] - without[k]);
+    return sum / static_cast<double>(with.size());
   }
 
   Verdict verdict() {
@@ -97,6 +108,13 @@ class Oracle {
   }
 
  private:
+  void read_noise() {
+    force_ =
+        d_.noise.recorded_force.empty() ? Colour{1.0 / kBlock, 0, 0} : colour_of(d_.noise.recorded_force);
+    pressure_ = d_.noise.recorded_pressure.empty() ? Colour{1.0 / kBlock, 0, 0}
+                                                   : colour_of(d_.noise.recorded_pressure);
+  }
+
   using Column = std::vector<double>;
 
   [[nodiscard]] bool hidden(const std::string& id) const {
@@ -379,6 +397,10 @@ class Oracle {
 };
 
 }  // namespace
+
+double whitened_noise(const Dataset& dataset, const std::vector<Signals>& noisy) {
+  return Oracle(dataset, Oracle::NoiseOnly{}).whitened_noise(noisy);
+}
 
 Verdict judge(const Dataset& dataset) {
   return Oracle(dataset).verdict();

@@ -29,4 +29,8 @@ struct Verdict {
 /// `dataset` must be testable and must hide something. Deterministic: what is drawn comes from the dataset's seed.
 Verdict judge(const Dataset& dataset);
 
+/// Mean square of the noise in `noisy` after whitening: one, when the oracle's noise model is that of the data. The angle
+/// counts as known in driven runs, where the encoder's steps are averaged out by whoever fits.
+double whitened_noise(const Dataset& dataset, const std::vector<Signals>& noisy);
+
 }  // namespace blind

@@ -18,6 +18,17 @@ TEST(Oracle, ties_added_inertia_with_the_gain_of_the_encoder_and_with_nothing_of
   for (const std::string& id : v.equals) EXPECT_LT(v.rivals.at(id), 3.0);
 }
 
+TEST(Oracle, weighs_by_the_noise_that_the_data_has) {
+  for (const char* kind : {"white", "coloured", "quantised"}) {
+    const Dataset d = make_dataset({.seed = 17, .noise = kind});
+    Random random(3);
+    std::vector<Signals> noisy;
+    for (const Signals& clean : d.clean) noisy.push_back(add_noise(clean, d.noise, d.rig, random));
+    // 1e5 whitened values; the model takes two slow parts as one and a converter's step as white: a tenth of sigma².
+    EXPECT_NEAR(whitened_noise(d, noisy), 1.0, 0.1) << kind;
+  }
+}
+
 TEST(Oracle, tells_friction_from_its_rivals_when_it_is_clear) {
   const Verdict v = judge(make_dataset({.seed = 1, .ids = {"coulomb_friction"}}));
   EXPECT_LT(v.self, 1.0);
