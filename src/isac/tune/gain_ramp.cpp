@@ -1,5 +1,7 @@
 #include "isac/tune/gain_ramp.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +11,9 @@ namespace {
 constexpr double kNearEnough =
     -0.35;  // per period: the root is then 5 to 10 % away in gain, and the regression short
 constexpr double kNoiseFactor = 5;  // turning points count when they stand out this far
-constexpr int kFewestTurns = 5;     // four half swings: two ratios
+constexpr double kAgree = 0.25;  // the regression extrapolates over a few per cent of gain, but under noise
+constexpr double kClear = 3;     // half swings over the threshold, so that noise does not hold them up
+constexpr int kFewestTurns = 5;  // four half swings: two ratios
 
 }  // namespace
 
@@ -73,7 +77,7 @@ void GainRamp::end_level() noexcept {
     for (int n = 1; n + 3 < turns_; ++n) {
       const auto at = static_cast<std::size_t>(n);
       const double now = std::abs(turn_[at + 1] - turn_[at]), later = std::abs(turn_[at + 3] - turn_[at + 2]);
-      if (!(now > 0) || !(later > 0)) continue;
+      if (!(std::min(now, later) > kClear * threshold())) continue;
       sum += std::log(later / now);
       ++ratios;
     }
@@ -82,35 +86,55 @@ void GainRamp::end_level() noexcept {
     if (ratios > 0) level.growth = sum / ratios;
   }
   levels_[static_cast<std::size_t>(count_++)] = level;
-  if (level.growth > kNearEnough) {
-    if (regressed())
-      finish();
-    else if (level.growth > -0.02)
-      fail("the first gain that could be measured already swings for ever; begin lower");
-  }
-  if (finished()) return;
-  if (count_ == kMostLevels) {
-    fail("the gain was raised twenty-four times and the joint never swung; begin higher, or kick more");
+  const std::optional<Ultimate> root = regressed();
+  if (level.growth > kNearEnough && root) {
+    finish();
     return;
   }
-  double next = gain_ * (std::isfinite(level.growth) ? std::sqrt(ramp_.factor) : ramp_.factor);
-  if (const auto root = regressed(); root && root->gain > gain_)
-    next = std::min(next, gain_ + 0.6 * (root->gain - gain_));
-  gain_ = next;
+  if (count_ == kMostLevels) {
+    fail(
+        "the gain was changed twenty-four times and the joint never swung evenly; begin at another gain, or "
+        "kick "
+        "more");
+    return;
+  }
+  if (level.growth > kNearEnough) {
+    gain_ *= 0.85;  // the first that could be measured is near already: one more, below it
+  } else {
+    gain_ *= std::isfinite(level.growth) ? std::sqrt(ramp_.factor) : ramp_.factor;
+    if (root && root->gain > level.gain)
+      gain_ = std::min(gain_, level.gain + 0.6 * (root->gain - level.gain));
+  }
 }
 
 std::optional<Ultimate> GainRamp::regressed() const noexcept {
-  // The last two levels that were measured: g(K) bends, and they are nearest to its root.
+  // The two levels nearest to the root: g(K) bends.
   const RampLevel *a = nullptr, *b = nullptr;
   for (int i = 0; i < count_; ++i) {
     const RampLevel& level = levels_[static_cast<std::size_t>(i)];
     if (!std::isfinite(level.growth)) continue;
-    a = b;
-    b = &level;
+    if (b == nullptr || std::abs(level.growth) < std::abs(b->growth)) {
+      a = b;
+      b = &level;
+    } else if (a == nullptr || std::abs(level.growth) < std::abs(a->growth)) {
+      a = &level;
+    }
   }
-  if (a == nullptr || !(b->growth > a->growth) || b->gain == a->gain) return {};
+  if (a == nullptr || !((b->growth - a->growth) * (b->gain - a->gain) > 0)) return {};
   const double share = -b->growth / (b->growth - a->growth);
   return Ultimate{b->gain + share * (b->gain - a->gain), b->period + share * (b->period - a->period)};
+}
+
+std::string second_opinion(const GainRamp& ramp, const Ultimate& fitted) {
+  const std::optional<Ultimate> root = ramp.regressed();
+  if (!root) return "no two levels of gain could be compared";
+  const double gain = root->gain / fitted.gain - 1, period = root->period / fitted.period - 1;
+  if (std::abs(gain) < kAgree && std::abs(period) < kAgree) return {};
+  return fmt::format(
+      "the growth of the swings and the plant fitted to them disagree by {:.0f} % in K_crit and {:.0f} % in "
+      "T_crit; friction or a "
+      "joint of another kind may be the cause",
+      100 * gain, 100 * period);
 }
 
 }  // namespace isac::tune

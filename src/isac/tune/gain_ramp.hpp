@@ -14,6 +14,7 @@
 #include <array>
 #include <limits>
 #include <optional>
+#include <string>
 
 #include "isac/tune/experiment.hpp"
 #include "isac/tune/loop.hpp"
@@ -62,5 +63,8 @@ class GainRamp final : public Experiment {
   int turns_ = 0;
   double extreme_ = 0, extreme_time_ = 0, direction_ = 1;
 };
+
+/// Why K_crit of the fitted plant is not believed: the levels' growth says another; empty: both agree to a quarter.
+[[nodiscard]] std::string second_opinion(const GainRamp& ramp, const Ultimate& fitted);
 
 }  // namespace isac::tune

@@ -181,28 +181,34 @@ struct Cascade {
   DelayedPolynomial position;             ///< fed back by the position loop
 };
 
-Cascade cascade_of(const JointModel& j, const Gains& g, const Sampling& sampling, bool unit_position) {
-  const double r = j.wheel_radius, stiffness = -(j.muscle.A * r * r), fast = sampling.interval / 2;
+Cascade cascade_of(const JointModel& j, const JointModel& believed, const Gains& g, const Sampling& sampling,
+                   bool unit_position) {
+  const double r = j.wheel_radius, fast = sampling.interval / 2;
   const double slow = sampling.interval * (0.5 * sampling.outer_every + 1.0);
-  const std::vector<double> motion = {j.inertia, j.muscle.D, stiffness}, valve = {j.valve.lag, 1.0};
+  const std::vector<double> motion = {j.inertia, j.muscle.D, -(j.muscle.A * r * r)},
+                            valve = {j.valve.lag, 1.0};
   const std::vector<double> filter = {sampling.velocity_filter, 1.0}, s = {1.0, 0.0};
-  const std::vector<double> pi = {j.muscle.B * r * g.torque.proportional, j.muscle.B * r * g.torque.integral};
-  const std::vector<double> through = scaled(pi, j.valve.gain);
+  const std::vector<double> pi = {g.torque.proportional, g.torque.integral};
+  const bool cascade = g.structure == control::Structure::kCascade;
+  const bool predicted = !cascade && g.model_pressure == control::ModelPressure::kPredicted;
+  // All times the lag that a predicting model believes in.
+  const std::vector<double> lag =
+      predicted ? std::vector<double>{believed.valve.lag, 1.0} : std::vector<double>{1.0};
+  const std::vector<double> through = multiply(scaled(pi, j.valve.gain * j.muscle.B * r), lag);
   const std::vector<double> plant = multiply(multiply(motion, valve), filter);
-  // What the actuator model says of spring and damping, the speed filtered: (A r² (1 + T_f s) − D s).
-  const std::vector<double> modelled = plus(scaled(filter, -stiffness), {-j.muscle.D, 0.0});
 
   Cascade c;
-  std::vector<double> inside = multiply(multiply(plant, s), s);
-  if (g.structure == control::Structure::kCascade) {
+  std::vector<double> inside = multiply(multiply(multiply(plant, s), s), lag);
+  if (cascade) {
     // The torque as measured: B r V u + (A r² − D s) φ = J s² φ.
     c.torque.push_back(
         {multiply(multiply(through, filter), {j.inertia, 0.0, 0.0, 0.0}), j.valve.dead_time + fast});
   } else {
-    const bool predicted = g.model_pressure == control::ModelPressure::kPredicted;
-    const std::vector<double> own =
-        predicted ? multiply(multiply(motion, filter), through) : multiply(plant, pi);
-    inside = plus(std::move(inside), multiply(own, s));
+    const double own = believed.muscle.B * r * (predicted ? believed.valve.gain : 1.0);
+    inside = plus(std::move(inside), multiply(multiply(plant, scaled(pi, own)), s));
+    // What the actuator model says of spring and damping, the speed filtered: (A r² (1 + T_f s) − D s).
+    const std::vector<double> modelled =
+        plus(scaled(filter, believed.muscle.A * r * r), {-believed.muscle.D, 0.0});
     c.torque.push_back({multiply(multiply(through, modelled), s), j.valve.dead_time + fast});
   }
   c.inside.push_back({trimmed(std::move(inside))});
@@ -243,15 +249,16 @@ Loop plant_loop(const JointModel& j) {
           .denominator = {{multiply({j.inertia, j.muscle.D, -(j.muscle.A * r * r)}, {j.valve.lag, 1.0})}}};
 }
 
-Loop control_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling) {
+Loop control_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling,
+                  const JointModel& believed) {
   if (gains.structure == control::Structure::kPid) return pid_loop(joint, gains.position, sampling);
-  Cascade c = cascade_of(joint, gains, sampling, false);
+  Cascade c = cascade_of(joint, believed, gains, sampling, false);
   c.torque.push_back(std::move(c.position));
   return {.numerator = std::move(c.torque), .denominator = std::move(c.inside)};
 }
 
 Loop outer_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling) {
-  Cascade c = cascade_of(joint, gains, sampling, true);
+  Cascade c = cascade_of(joint, joint, gains, sampling, true);
   c.inside.insert(c.inside.end(), c.torque.begin(), c.torque.end());
   return {.numerator = {std::move(c.position)}, .denominator = std::move(c.inside)};
 }

@@ -46,8 +46,14 @@ struct Gains {
 /// Δp → φ.
 [[nodiscard]] Loop plant_loop(const LagPlant& plant);
 [[nodiscard]] Loop plant_loop(const JointModel& joint);
-/// The loop of these gains, opened at the valves' command.
-[[nodiscard]] Loop control_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling = {});
+/// The loop of these gains, opened at the valves' command. `believed`: what the controller takes the joint for (limits and C do
+/// not enter).
+[[nodiscard]] Loop control_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling,
+                                const JointModel& believed);
+[[nodiscard]] inline Loop control_loop(const JointModel& joint, const Gains& gains,
+                                       const Sampling& sampling = {}) {
+  return control_loop(joint, gains, sampling, joint);
+}
 /// A P controller of 1 N m/rad around the closed torque loop, opened at the torque asked for.
 [[nodiscard]] Loop outer_loop(const JointModel& joint, const Gains& gains, const Sampling& sampling = {});
 
