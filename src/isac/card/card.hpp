@@ -65,8 +65,8 @@ class Card {
   }
   /// The card's clock now, so that a late answer can be told from a late question; −1 where time stands still meanwhile.
   [[nodiscard]] virtual std::int64_t clock_ns() const noexcept { return -1; }
-  /// After a failure, with the valves vented: which channel does not answer and why, or nothing. Not for the loop: it
-  /// allocates and may take a second per dead channel.
+  /// After a failure, with the valves vented: the first channel of each device that does not answer and why, or nothing.
+  /// Not for the loop: it allocates and may take a second per dead device.
   [[nodiscard]] virtual std::string diagnose() { return {}; }
 };
 

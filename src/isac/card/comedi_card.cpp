@@ -147,12 +147,16 @@ class ComediCard final : public Card {
 
   [[nodiscard]] std::string diagnose() override {
     std::string text;
+    std::vector<std::string>
+        dead;  // a board that failed once is not asked again: each channel may take a second
     for (const SignalLine& line : table_.lines) {
-      if (line.kind == Kind::kOutput) continue;
+      if (line.kind == Kind::kOutput || std::find(dead.begin(), dead.end(), line.device) != dead.end())
+        continue;
       lsampl_t code = 0;
       const int rc = comedi_data_read(device(line.device).handle, line.subdevice, line.channel,
                                       range_of(line), aref_of(line.reference), &code);
       if (rc == 1) continue;
+      dead.push_back(line.device);
       text += (text.empty() ? "" : "; ") + line.signal + " (" + place(line) +
               "): " + comedi_strerror(comedi_errno());
     }

@@ -134,6 +134,7 @@ class Child {
   }
 
   void work() {
+    keep_stacks_small();
     open_card();
     StopSignals::vent_on_death(card_.get());
     const JointWiring wiring = wire_joints(run_.rig, card_->shape(), run_.joints);

@@ -41,6 +41,14 @@ std::string RealTime::words() const {
   return text;
 }
 
+void keep_stacks_small() noexcept {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return;
+  pthread_attr_setstacksize(&attributes, 4 * kStackBytes);
+  static_cast<void>(pthread_setattr_default_np(&attributes));  // where refused, the usual size
+  pthread_attr_destroy(&attributes);
+}
+
 RealTime prepare_real_time(int priority) noexcept {
   RealTime result;
   result.priority = priority;

@@ -26,6 +26,10 @@ struct RealTime {
   [[nodiscard]] std::string words() const;
 };
 
+/// Stacks of threads started from now on: what is locked is filled, and must be given back before a dead process closes its
+/// files, which is how a supervisor learns of the death. Call before starting threads.
+void keep_stacks_small() noexcept;
+
 /// For the calling thread and its process; allocates nothing.
 [[nodiscard]] RealTime prepare_real_time(int priority) noexcept;
 
