@@ -126,9 +126,9 @@ std::vector<double> block_bootstrap(const std::vector<double>& recorded, std::si
   std::vector<double> x;
   x.reserve(count + block);
   while (x.size() < count) {
-    const auto from = static_cast<std::size_t>(random.index(static_cast<int>(recorded.size() - block)));
+    const auto from = static_cast<std::size_t>(random.index(static_cast<int>(recorded.size())));
     const double sign = random.sign();
-    for (std::size_t i = 0; i < block; ++i) x.push_back(sign * recorded[from + i]);
+    for (std::size_t i = 0; i < block; ++i) x.push_back(sign * recorded[(from + i) % recorded.size()]);
   }
   x.resize(count);
   return x;

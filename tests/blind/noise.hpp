@@ -36,7 +36,8 @@ Signals add_noise(const Signals& clean, const Noise& noise, const Rig& rig, Rand
 /// x_k+1 = e^(−dt/memory) x_k + …, stationary from the first value on, standard deviation `sd`.
 std::vector<double> ornstein_uhlenbeck(std::size_t count, double sd, double memory, Random& random);
 
-/// Blocks of `recorded`, each from a drawn place and with a drawn sign, until `count` are there.
+/// Blocks of `recorded`, each from a drawn place (going round at its end, so that every value is as likely) and with a
+/// drawn sign, until `count` are there.
 std::vector<double> block_bootstrap(const std::vector<double>& recorded, std::size_t count, std::size_t block,
                                     Random& random);
 

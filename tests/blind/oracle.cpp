@@ -55,6 +55,13 @@ Colour colour_of(const std::vector<double>& recorded) {
   colour.stay = std::clamp(c[2] / c[1], 0.05, 0.98);
   colour.slow = std::min(c[1] / colour.stay, 0.95 * c[0]);
   colour.white = c[0] - colour.slow;
+  // The picture is rough; its size is set so that the recording's own innovations have variance one.
+  std::vector<double> innovations = means;
+  colour.whiten(innovations, 0);
+  double square = 0.0;
+  for (const double x : innovations) square += x * x / static_cast<double>(innovations.size());
+  colour.white *= square;
+  colour.slow *= square;
   return colour;
 }
 
@@ -150,8 +157,8 @@ class Oracle {
     c.white = forces * force_.white + pressures * pressure_.white +
               (2.0 * r * r * n.force_step * n.force_step + arm * arm * n.pressure_step * n.pressure_step) /
                   12.0 / kBlock;
-    c.stay = force_.stay;
     c.slow = forces * force_.slow + pressures * pressure_.slow;
+    c.stay = forces * force_.slow > pressures * pressure_.slow ? force_.stay : pressure_.stay;
     c.add(n.torque_coloured * n.torque_coloured, n.torque_memory, sample_time);
     c.add(2.0 * r * r * n.force_wander * n.force_wander, n.wander_memory, sample_time);
     c.add(arm * arm * n.pressure_coloured * n.pressure_coloured, n.pressure_memory, sample_time);
