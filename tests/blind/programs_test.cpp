@@ -106,5 +106,19 @@ TEST_F(Programs, say_by_their_exit_code_what_went_wrong) {
   EXPECT_EQ(run("blind_score " + path("nowhere")), 3);
 }
 
+TEST(Blindness, is_kept_no_source_here_includes_anything_of_the_toolkit) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(ISAC_SOURCE_DIR "/tests/blind")) {
+    if (entry.path().extension() != ".cpp" && entry.path().extension() != ".hpp") continue;
+    ++files;
+    std::ifstream in(entry.path());
+    for (std::string line; std::getline(in, line);)
+      EXPECT_FALSE(line.starts_with("#include \"isac") || line.starts_with("#include <isac") ||
+                   line.starts_with("#include \".."))
+          << entry.path() << ": " << line;
+  }
+  EXPECT_GT(files, 20);
+}
+
 }  // namespace
 }  // namespace blind
