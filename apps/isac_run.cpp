@@ -117,10 +117,9 @@ void add_json(CLI::App& app, apps::RunWords& words) {
 
 void add_common(CLI::App& app, apps::RunWords& words) {
   app.add_option(
-         "--params", words.params,
-         "Parameters and gains: params.toml or the packed table (sim: and replay: without: the seed's)")
-      ->check(CLI::ExistingFile);
-  app.add_option("--rig", words.rig, "The rig file: limits, calibration, card")->check(CLI::ExistingFile);
+      "--params", words.params,
+      "Parameters and gains: params.toml or the packed table (sim: and replay: without: the seed's)");
+  app.add_option("--rig", words.rig, "The rig file: limits, calibration, card");
   app.add_option("-o,--output", words.log, "Record the run as CSV (never replaces a file)");
   app.add_option(
       "--flight", words.flight,
@@ -150,6 +149,7 @@ void add_live(CLI::App& app, apps::RunWords& words) {
       ->capture_default_str();
   app.add_flag("--require-rt", words.require_rt, "Refuse to run without SCHED_FIFO and locked memory");
   app.add_flag("--yes", words.yes, "Arm without asking");
+  app.add_flag("--ask", words.ask, "Ask before arming, on sim: and replay: too");
 }
 
 }  // namespace
@@ -173,14 +173,12 @@ int main(int argc, char** argv) {
   position->add_option("--step", words.step, "Height, e.g. \"0.3 rad\"");
   position->add_option("--sine", words.sine, "Amplitude, e.g. \"0.15 rad\"");
   position->add_option("--frequency", words.frequency, "Of the sine")->capture_default_str();
-  position->add_option("--csv", words.points, "Columns time and angle, or phi1 ... of all joints")
-      ->check(CLI::ExistingFile);
+  position->add_option("--csv", words.points, "Columns time and angle, or phi1 ... of all joints");
   position->add_option("--joint", words.joint, "Which joint moves; the others hold")->capture_default_str();
   CLI::App* trajectory =
       app.add_subcommand("trajectory", "Points of joint angles, all checked before anything moves");
   trajectory->add_option("points", words.points, "CSV with time and angle, or phi1 ... of all joints")
-      ->required()
-      ->check(CLI::ExistingFile);
+      ->required();
   CLI::App* torque = app.add_subcommand("torque", "Hold a torque");
   torque->add_option("--torque", words.torque, "E.g. \"1.5 N m\"")->required();
   torque->add_option("--joint", words.joint, "Which joint; the others have 0 N m")->capture_default_str();
@@ -191,7 +189,7 @@ int main(int argc, char** argv) {
   }
   CLI::App* replay = app.add_subcommand(
       "replay", "Replay a recorded run through the controller and compare its commands bit for bit");
-  replay->add_option("run", words.replayed, "A recording of isac-run")->required()->check(CLI::ExistingFile);
+  replay->add_option("run", words.replayed, "A recording of isac-run")->required();
   add_common(*replay, words);
   CLI::App* jitter = app.add_subcommand("latency", "How late this machine wakes up a loop");
   jitter->add_option("--duration", words.duration, "Default \"10 s\"");

@@ -126,7 +126,7 @@ AskedRun asked_run(const RunWords& words, const std::string& mode) {
                : words.log.empty()   ? std::filesystem::path("isac-run.flight.csv")
                                      : std::filesystem::path(words.log).replace_extension(".flight.csv");
   run.pace_real = words.pace == "real";
-  run.ask_to_arm = !simulated && !words.yes;
+  run.ask_to_arm = words.ask || (!simulated && !words.yes);
   run.require_real_time = words.require_rt;
   run.priority = words.priority;
   // Where nothing real moves, a computer that is busy elsewhere is no reason to stop.

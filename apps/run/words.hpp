@@ -15,7 +15,7 @@ struct RunWords {
   std::string replayed;
   double rate = 2000;
   int joint = 1, priority = 80;
-  bool yes = false, require_rt = false, gains_of_seed = false;
+  bool yes = false, ask = false, require_rt = false;
 };
 
 struct AskedRun {

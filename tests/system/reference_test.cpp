@@ -41,7 +41,12 @@ TEST(Reference, is_what_the_programs_say_of_themselves) {
        {ISAC_IDENTIFY_SUBCOMMANDS}},
       {"isac-log",
        "Records sweeps on a rig; [how to log a sweep](../how-to/log-a-sweep.md) shows it at work.",
-       {}}};
+       {}},
+      {"isac-run",
+       "Drives joints by the identified model under a supervisor; [how to run](../how-to/run.md) shows it at "
+       "work, "
+       "[faults](../faults.md) what it does when something goes wrong.",
+       {"position", "trajectory", "torque", "hand", "replay", "latency"}}};
   for (const Page& page : pages) {
     const auto path = std::filesystem::path(ISAC_SOURCE_DIR) / "docs" / "reference" / (page.program + ".md");
     const std::string text = page_text(page);

@@ -213,6 +213,22 @@ TEST(IsacRun, interrupt_ends_it_cleanly) {
   }
 }
 
+TEST(IsacRun, waits_for_a_person_to_permit_the_arming) {
+  const ScratchFolder folder;
+  // Nobody at the keyboard: it never arms, and leaves. Somebody who presses Enter: it runs.
+  const auto alone = run({"hand", "--ask", "--pace", "real", "--duration", "0.1 s", "-o",
+                          folder / "alone.csv", "--json", folder / "alone.json"});
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+  EXPECT_EQ(answer_of(folder / "alone.json")["ended"], "stopped");
+  const auto log = read_recording(folder / "alone.csv");
+  for (const double state : log.column("state").values) ASSERT_EQ(state, 0.0);
+  const std::string call = "(sleep 0.3; echo) | " ISAC_BIN_DIR
+                           "/isac-run hand --ask --pace real --heartbeat '1 s' --duration '0.1 s' --json " +
+                           (folder / "run.json") + " > /dev/null";
+  EXPECT_EQ(std::system(call.c_str()), 0);
+  EXPECT_EQ(answer_of(folder / "run.json")["ended"], "done");
+}
+
 TEST(IsacRun, killed_loop_is_vented_by_the_supervisor_and_its_last_cycles_are_kept) {
   for (const int signal : {SIGKILL, SIGABRT, SIGSEGV}) {
     const ScratchFolder folder;
@@ -301,6 +317,9 @@ TEST(IsacRun, refuses_what_cannot_be_run_and_touches_nothing) {
       {{"replay", folder / "far.csv"}, 3, "no recording of a run"},
       {{"position", "--step", "0.1 rad", "-o", folder / "there.csv"}, 2, "there.csv"},
       {{"torque", "--torque", "1 rad"}, 2, "--torque"},
+      {{"trajectory", folder / "nowhere.csv"}, 3, "nowhere.csv"},
+      {{"replay", folder / "nowhere.csv"}, 3, "nowhere.csv"},
+      {{"position", "--step", "0.1 rad", "--params", folder / "nowhere.toml"}, 3, "nowhere.toml"},
   };
   for (const auto& one : cases) {
     const auto r = run(one.words);
