@@ -10,23 +10,41 @@
 #include "explain/additions.hpp"
 #include "explain/answer.hpp"
 #include "explain/inputs.hpp"
+#include "explain/plan.hpp"
 #include "explain/summary.hpp"
 #include "isac/explain/explain.hpp"
+#include "isac/record/csv_writer.hpp"
 #include "isac/record/params.hpp"
+#include "isac/record/plan_file.hpp"
+#include "isac/report/explain_report.hpp"
 
 namespace {
 
 using namespace isac;
 
 struct Words : apps::ExplainWords {
-  std::string json, params;
+  std::string json, params, report, plan;
   int threads = 2;
   std::uint64_t seed = 1;
   bool verbose = false;
 };
 
+report::ExplainReportInput report_input(const explain::Explanation& answer, const apps::ExplainInputs& inputs,
+                                        const std::vector<std::string>& compensation, const Words& words) {
+  report::ExplainReportInput input;
+  input.head.title = inputs.title.empty() ? "What is missing" : "What is missing: " + inputs.title;
+  input.head.created = apps::now_iso8601();
+  input.answer = &answer;
+  input.compensation = compensation;
+  input.params_file = apps::short_name(words.params);
+  if (answer.next_experiment && !answer.next_experiment->runs.empty())
+    input.plan_file = apps::short_name(words.plan);
+  return input;
+}
+
 int run(Words words) {
-  for (const std::string& path : {words.json, words.params}) apps::require_writable(path);
+  for (const std::string& path : {words.json, words.params, words.report, words.plan})
+    apps::require_writable(path);
   words.hash = !words.params.empty();
   apps::ExplainInputs inputs = apps::read_inputs(words);
 
@@ -36,7 +54,7 @@ int run(Words words) {
   options.excluded = words.excluded;
   options.threads = words.threads;
   options.seed = words.seed;
-  options.traces = false;
+  options.traces = !words.report.empty();
   apps::Progress progress(words.verbose);
   options.progress = [&progress](const std::string& line) { progress.say(line); };
   const explain::Explanation answer = explain::explain(inputs.runs, inputs.heldout, options);
@@ -44,10 +62,19 @@ int run(Words words) {
   progress.end();
 
   const std::vector<std::string> compensation = apps::compensation_of(answer);
+  if (!words.report.empty())
+    record::write_atomically(
+        words.report, report::render_explain_report(report_input(answer, inputs, compensation, words)));
   if (!words.params.empty())
     record::update_params(words.params, apps::params_of(answer, inputs, apps::now_iso8601()));
+  const series::Plan plan = apps::plan_of(answer);
+  const bool planned = !words.plan.empty() && !plan.runs.empty();
+  if (planned) record::write_plan(words.plan, plan);
   if (!words.json.empty()) apps::write_text(words.json, apps::format_explanation(answer, compensation));
-  if (words.json != "-") apps::print_explanation(answer, compensation);
+  if (words.json != "-") {
+    apps::print_explanation(answer, compensation);
+    if (!words.plan.empty()) apps::print_plan(answer, planned ? words.plan : std::string());
+  }
   return 0;
 }
 
@@ -73,6 +100,9 @@ int main(int argc, char** argv) {
   app.add_option("--exclude", words.excluded, "Effects that are not to be considered, by their ids");
   app.add_option("--json", words.json, "Answer as JSON into a file, - for standard output");
   app.add_option("-o,--params", words.params, "params.toml to write or update, with the effects added");
+  app.add_option("--report", words.report, "HTML report to write");
+  app.add_option("--plan", words.plan,
+                 "plan.toml to write: the experiment to record next, for isac-log --plan");
   app.add_option("--threads", words.threads, "Threads to use")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();

@@ -4,9 +4,11 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <limits>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "common/quantity.hpp"
 #include "isac/card/card.hpp"
 #include "isac/core/error.hpp"
+#include "isac/record/plan_file.hpp"
 #include "isac/runtime/log_session.hpp"
 #include "isac/runtime/progress.hpp"
 #include "isac/runtime/stop_signals.hpp"
@@ -26,7 +29,7 @@ using namespace isac;
 
 /// The words of the call that need more than CLI11: quantities with units.
 struct Words {
-  std::string experiment, card, rig, folder, json, pace = "virtual";
+  std::string experiment, plan, card, rig, folder, json, pace = "virtual";
   std::string duration, hold, amplitude, speed, base;
   std::string delta_pressures, angles, heights, weights, supplies;
   std::string limit_pressure, limit_delta_pressure, limit_angle, limit_speed, limit_force;
@@ -70,6 +73,27 @@ struct Given {
   bool rate = false, seed = false;
 };
 
+/// Recordings of a plan are numbered behind those of earlier plans in the same folder, so that they add to it.
+int round_of(const std::filesystem::path& folder, bool overwrite) {
+  int round = 1;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+    int number = 0;
+    if (std::sscanf(entry.path().filename().c_str(), "plan%d-", &number) == 1)
+      round = std::max(round, overwrite ? number : number + 1);
+  }
+  return round;
+}
+
+std::vector<series::Program> planned_programs(const Words& words, const series::ExcitationOptions& options) {
+  const series::Plan plan = record::read_plan(words.plan);
+  try {
+    return series::plan_programs(plan, options, round_of(words.folder, words.overwrite));
+  } catch (const Error& error) {
+    throw Error(error.kind(), error.code(), error.text(), {words.plan, 0, 0});
+  }
+}
+
 runtime::SessionOptions session_of(const Words& words, const Given& given) {
   runtime::SessionOptions session;
   session.rig = record::read_rig(words.rig);
@@ -84,8 +108,9 @@ runtime::SessionOptions session_of(const Words& words, const Given& given) {
   }
   const bool rig_rate = !given.rate && std::isfinite(rig.card.sample_rate);
   session.rate = rig_rate ? rig.card.sample_rate : words.rate;
-  session.dataset =
-      words.experiment == "all" || words.experiment == "testbed-bundle" || words.experiment == "calibrate";
+  session.dataset = words.experiment == "all" || words.experiment == "testbed-bundle" ||
+                    words.experiment == "calibrate" ||
+                    (!words.plan.empty() && !std::filesystem::exists(session.folder / "rig.toml"));
   session.pace_real = words.pace == "real";
   session.raw = words.raw || words.experiment == "calibrate";  // which is about nothing but counts
   session.overwrite = words.overwrite;
@@ -123,7 +148,8 @@ runtime::SessionOptions session_of(const Words& words, const Given& given) {
   excitation.slow = words.slow || !words.fast;
   excitation.fast = words.fast || !words.slow;
   excitation.seed = words.seed;
-  session.programs = series::make_programs(words.experiment, excitation);
+  session.programs = words.plan.empty() ? series::make_programs(words.experiment, excitation)
+                                        : planned_programs(words, excitation);
   return session;
 }
 
@@ -199,6 +225,10 @@ class Console : public runtime::SessionObserver {
 };
 
 int log_sweeps(const Words& words, const Given& given) {
+  if (words.experiment.empty() && words.plan.empty()) {
+    throw Error(ErrorKind::kUsage, "experiment_missing",
+                "experiment is required: name one, like constant-pressure, or a plan with --plan plan.toml; see --help");
+  }
   const runtime::SessionOptions session = session_of(words, given);
   apps::require_writable(words.json);
   const runtime::StopSignals signals;
@@ -236,7 +266,10 @@ int main(int argc, char** argv) {
       "isac-log"};
   app.set_version_flag("--version", ISAC_VERSION);
   Words words;
-  app.add_option("experiment", words.experiment, "What to record (see below)")->required();
+  CLI::Option* experiment = app.add_option("experiment", words.experiment, "What to record (see below)");
+  CLI::Option* plan = app.add_option("--plan", words.plan,
+                                     "plan.toml of isac-explain: record its runs instead of an experiment");
+  plan->excludes(experiment);
   app.add_option("--card", words.card,
                  "The card, e.g. sim: or replay:FILE (default: the rig file's, else sim:)");
   app.add_option("--rig", words.rig, "The rig file, rig.toml")->required();

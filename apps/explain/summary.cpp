@@ -136,4 +136,15 @@ void print_explanation(const explain::Explanation& e, const std::vector<std::str
   print_warnings(e.warnings);
 }
 
+void print_plan(const explain::Explanation& answer, const std::string& path) {
+  const Sheet sheet;
+  if (!path.empty()) {
+    sheet.row("plan", path + " holds it; isac-log --plan " + path + " --rig rig.toml -o DATASET records it");
+  } else if (answer.next_experiment) {
+    sheet.row("plan", "none was written: no run of this rig as it stands would settle it");
+  } else {
+    sheet.row("plan", "none was written: nothing needs to be told apart");
+  }
+}
+
 }  // namespace isac::apps

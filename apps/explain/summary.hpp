@@ -2,7 +2,6 @@
 /// What isac-explain says on the terminal: a live line while it works, then the answer as a lab engineer reads it.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,5 +25,8 @@ class Progress {
 };
 
 void print_explanation(const explain::Explanation& answer, const std::vector<std::string>& compensation);
+
+/// How to record the plan that was written to `path`, or why there is none (empty).
+void print_plan(const explain::Explanation& answer, const std::string& path);
 
 }  // namespace isac::apps

@@ -8,6 +8,7 @@
 #include "isac/record/data_tables.hpp"
 #include "isac/record/model_file.hpp"
 #include "isac/record/params.hpp"
+#include "isac/record/plan_file.hpp"
 #include "isac/record/rig.hpp"
 
 namespace {
@@ -43,6 +44,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   round_trip(text, isac::record::parse_rig, isac::record::format_rig);
   round_trip(text, isac::record::parse_model, isac::record::format_model);
   round_trip(text, isac::record::parse_params, isac::record::format_params);
+  round_trip(text, isac::record::parse_plan, isac::record::format_plan);
   refuses_in_one_line([&text] { (void)isac::record::parse_data(text, "fuzz.toml"); });
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "isac/core/error.hpp"
 #include "isac/record/model_file.hpp"
 #include "isac/record/params.hpp"
+#include "isac/record/plan_file.hpp"
 #include "isac/record/rig.hpp"
 
 namespace isac::record {
@@ -51,6 +52,8 @@ void read_by_name(const std::filesystem::path& path) {
     (void)read_model(path);
   } else if (name.starts_with("params_")) {
     (void)read_params(path);
+  } else if (name.starts_with("plan_")) {
+    (void)read_plan(path);
   } else {
     throw std::runtime_error("no reader for " + name);
   }

@@ -11,6 +11,7 @@
 #include "isac/record/data_tables.hpp"
 #include "isac/record/model_file.hpp"
 #include "isac/record/params.hpp"
+#include "isac/record/plan_file.hpp"
 #include "isac/record/rig.hpp"
 #include "isac/record/tables.hpp"
 
@@ -48,7 +49,8 @@ TEST(FormatsDocument, every_toml_example_is_read_by_its_reader) {
   EXPECT_EQ(parse_model(example_of("isac.model/1"), "formats.md").terms.size(), 4u);
   EXPECT_EQ(parse_params(example_of("isac.params/1"), "formats.md").sections.size(), 5u);
   EXPECT_EQ(parse_data(example_of("isac.data/1"), "formats.md").number(0, "length"), 0.51);
-  EXPECT_EQ(examples("toml").size(), 4u) << "an example that no line above reads";
+  EXPECT_EQ(parse_plan(example_of("isac.plan/1"), "formats.md").runs.size(), 2u);
+  EXPECT_EQ(examples("toml").size(), 5u) << "an example that no line above reads";
 }
 
 TEST(FormatsDocument, the_limits_of_the_rig_example_are_those_used_where_none_is_given) {

@@ -77,6 +77,7 @@ std::vector<std::string> call_for(const Bad& bad) {
   if (bad.file.rfind("rig_", 0) == 0) return {"isac-identify", "joint", good, "--rig", path};
   if (bad.file.rfind("model_", 0) == 0)
     return {"isac-identify", "joint", good, "--rig", rig, "--model", path};
+  if (bad.file.rfind("plan_", 0) == 0) return {"isac-log", "--plan", path, "--rig", rig};
   return {"isac-identify", "export", path};
 }
 
@@ -84,7 +85,9 @@ void expect_answered(const Bad& bad) {
   SCOPED_TRACE(bad.file);
   const ScratchFolder scratch;
   std::vector<std::string> words = call_for(bad);
-  if (words[1] == "export") {
+  if (words[0] == "isac-log") {
+    words.insert(words.end(), {"-o", scratch / "dataset"});
+  } else if (words[1] == "export") {
     words.insert(words.end(), {"-o", scratch / "tables"});
   } else {
     words.insert(words.end(), {"-o", scratch / "params.toml", "--report", scratch / "report.html"});

@@ -47,6 +47,7 @@ card::Task to_task(const series::Ask& ask) noexcept {
   task.speed_rad_s = ask.speed;
   task.vary_speed = ask.vary_speed;
   task.angle_rad = ask.angle;
+  task.middle_rad = ask.middle;
   return task;
 }
 

@@ -44,12 +44,13 @@ struct Ask {
     kHangWeight,    ///< `load` on a force sensor
     kConnectSupply  ///< both pressure sensors on the supply at `pressure`
   } kind = Kind::kRest;
-  double amplitude = 0;     ///< rad, either side of where the bar rests
-  double speed = 0;         ///< rad/s, peak
-  bool vary_speed = false;  ///< all speeds up to `speed`
-  double angle = 0;         ///< rad, where to clamp or hold
-  double load = 0;          ///< N
-  double pressure = 0;      ///< Pa
+  double amplitude = 0;                                      ///< rad, either side of where the bar rests
+  double speed = 0;                                          ///< rad/s, peak
+  bool vary_speed = false;                                   ///< all speeds up to `speed`
+  double angle = 0;                                          ///< rad, where to clamp or hold
+  double load = 0;                                           ///< N
+  double pressure = 0;                                       ///< Pa
+  double middle = std::numeric_limits<double>::quiet_NaN();  ///< rad, of a sweep; NaN: where the bar rests
 };
 
 struct Stage {
