@@ -8,6 +8,15 @@ namespace isac::test {
 thread_local bool watched = false;
 thread_local long allocations = 0;
 
+void watch_allocations() noexcept {
+  allocations = 0;
+  watched = true;
+}
+long watched_allocations() noexcept {
+  watched = false;
+  return allocations;
+}
+
 }  // namespace isac::test
 
 void* operator new(std::size_t size) {

@@ -135,7 +135,7 @@ class RowReader {
 SignalTable table_of(const record::DataTable& data) {
   SignalTable table{.file = data.file, .title = data.title, .lines = {}};
   for (std::size_t row = 0; row < data.rows.size(); ++row) table.lines.push_back(RowReader(data, row).line());
-  std::stable_sort(table.lines.begin(), table.lines.end(), [](const SignalLine& a, const SignalLine& b) {
+  std::sort(table.lines.begin(), table.lines.end(), [](const SignalLine& a, const SignalLine& b) {
     return std::pair(a.kind, a.index) < std::pair(b.kind, b.index);
   });
   const auto refuse = [&](const char* code, const std::string& text) {

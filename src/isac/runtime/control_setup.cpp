@@ -8,7 +8,6 @@
 #include <iterator>
 #include <span>
 
-#include "isac/control/deployed.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/record/params.hpp"

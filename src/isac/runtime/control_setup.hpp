@@ -15,8 +15,8 @@
 #include <filesystem>
 #include <string>
 
+#include "isac/control/deployed.hpp"
 #include "isac/core/estimated.hpp"
-#include "isac/models/parameter_table.hpp"
 #include "isac/record/rig.hpp"
 #include "isac/runtime/control_loop.hpp"
 
