@@ -23,12 +23,14 @@ struct Comparison {
 };
 
 /// `penalty` is added to the second's loss (twice its surplus of parameters, in units of c).
-[[nodiscard]] Comparison compare(const Prepared& data, const Fit& best, const Fit& rival, int surplus_parameters,
-                                 double noise_unit);
+[[nodiscard]] Comparison compare(const Prepared& data, const Eigen::VectorXd& best,
+                                 const Eigen::VectorXd& rival, int surplus_parameters, double noise_unit);
 
 inline constexpr double kSetLimit = 1.645;
 inline constexpr double kTwinLimit = 3.0;
 
-[[nodiscard]] inline bool cannot_rule_out(const Comparison& c) { return c.t < kSetLimit || c.separation < kTwinLimit; }
+[[nodiscard]] inline bool cannot_rule_out(const Comparison& c) {
+  return c.t < kSetLimit || c.separation < kTwinLimit;
+}
 
 }  // namespace isac::explain

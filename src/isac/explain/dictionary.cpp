@@ -29,10 +29,14 @@ const std::vector<Function>& functions() {
       {"angle^5", {"angle"}, [](const Scaled& s) { return std::pow(s.angle, 5); }},
       {"|angle|", {"angle"}, [](const Scaled& s) { return std::abs(s.angle); }},
       {"velocity", {"velocity"}, [](const Scaled& s) { return s.velocity; }},
-      {"velocity |velocity|", {"velocity"}, [](const Scaled& s) { return s.velocity * std::abs(s.velocity); }},
+      {"velocity |velocity|",
+       {"velocity"},
+       [](const Scaled& s) { return s.velocity * std::abs(s.velocity); }},
       {"|velocity|", {"velocity"}, [](const Scaled& s) { return std::abs(s.velocity); }},
       {"velocity^5", {"velocity"}, [](const Scaled& s) { return std::pow(s.velocity, 5); }},
-      {"sqrt|velocity| sgn", {"velocity"}, [](const Scaled& s) { return std::sqrt(std::abs(s.velocity)) * s.sign; }},
+      {"sqrt|velocity| sgn",
+       {"velocity"},
+       [](const Scaled& s) { return std::sqrt(std::abs(s.velocity)) * s.sign; }},
       {"sgn", {"direction"}, [](const Scaled& s) { return s.sign; }},
       {"sgn |angle|", {"direction", "angle"}, [](const Scaled& s) { return s.sign * std::abs(s.angle); }},
       {"sgn angle", {"direction", "angle"}, [](const Scaled& s) { return s.sign * s.angle; }},
@@ -41,11 +45,17 @@ const std::vector<Function>& functions() {
       {"sgn |dp|", {"direction", "delta_pressure"}, [](const Scaled& s) { return s.sign * std::abs(s.dp); }},
       {"sgn dp", {"direction", "delta_pressure"}, [](const Scaled& s) { return s.sign * s.dp; }},
       {"sgn time", {"direction", "time"}, [](const Scaled& s) { return s.sign * s.day; }},
-      {"velocity |angle|", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * std::abs(s.angle); }},
+      {"velocity |angle|",
+       {"velocity", "angle"},
+       [](const Scaled& s) { return s.velocity * std::abs(s.angle); }},
       {"velocity angle", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * s.angle; }},
-      {"velocity angle^2", {"velocity", "angle"}, [](const Scaled& s) { return s.velocity * s.angle * s.angle; }},
+      {"velocity angle^2",
+       {"velocity", "angle"},
+       [](const Scaled& s) { return s.velocity * s.angle * s.angle; }},
       {"velocity dp", {"velocity", "delta_pressure"}, [](const Scaled& s) { return s.velocity * s.dp; }},
-      {"velocity |dp|", {"velocity", "delta_pressure"}, [](const Scaled& s) { return s.velocity * std::abs(s.dp); }},
+      {"velocity |dp|",
+       {"velocity", "delta_pressure"},
+       [](const Scaled& s) { return s.velocity * std::abs(s.dp); }},
       {"velocity p_mean", {"velocity", "mean_pressure"}, [](const Scaled& s) { return s.velocity * s.p0; }},
       {"dp", {"delta_pressure"}, [](const Scaled& s) { return s.dp; }},
       {"dp^2", {"delta_pressure"}, [](const Scaled& s) { return s.dp * s.dp; }},
@@ -68,26 +78,37 @@ const std::vector<Function>& functions() {
       {"day angle", {"time", "angle"}, [](const Scaled& s) { return s.day * s.angle; }},
       {"day dp", {"time", "delta_pressure"}, [](const Scaled& s) { return s.day * s.dp; }},
       {"day velocity", {"time", "velocity"}, [](const Scaled& s) { return s.day * s.velocity; }},
-      {"after reversal 0.02", {"direction", "memory"}, [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.02); }},
-      {"after reversal 0.1", {"direction", "memory"}, [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.1); }},
+      {"after reversal 0.02",
+       {"direction", "memory"},
+       [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.02); }},
+      {"after reversal 0.1",
+       {"direction", "memory"},
+       [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.1); }},
   };
   return all;
 }
 
-double largest(double so_far, double value) { return std::isfinite(value) ? std::max(so_far, std::abs(value)) : so_far; }
+double largest(double so_far, double value) {
+  return std::isfinite(value) ? std::max(so_far, std::abs(value)) : so_far;
+}
 
 }  // namespace
 
-std::vector<DictionaryColumn> dictionary(const Predictor& predictor) {
-  const Prepared& data = predictor.data();
+struct Dictionary::Signals {
   Scaled top{1e-9, 1e-9, 1e-9, 1e-9, 1, 1e-9, 1e-9, 1e-9, 1e-9, 1};
   struct Extra {
     std::vector<double> rate[2], age, sign;
   };
-  std::vector<Extra> extra(data.runs.size());
+  std::vector<Extra> extra;
+};
+
+Dictionary::Dictionary(const Prepared& data) : data_(&data) {
+  auto signals = std::make_shared<Signals>();
+  Scaled& top = signals->top;
+  signals->extra.resize(data.runs.size());
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const PreparedRun& run = data.runs[r];
-    Extra& e = extra[r];
+    Signals::Extra& e = signals->extra[r];
     const std::size_t n = run.time.size();
     for (int i = 0; i < 2; ++i) {
       e.rate[i].assign(n, 0.0);
@@ -117,45 +138,56 @@ std::vector<DictionaryColumn> dictionary(const Predictor& predictor) {
       top.day = largest(top.day, run.day_offset + run.time[k]);
     }
   }
-  std::vector<DictionaryColumn> out;
-  const auto n = static_cast<Eigen::Index>(data.rows.size());
-  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
-    if (!data.has(chain)) continue;
-    static constexpr const char* kNames[] = {"torque", "p1", "p2", "motion"};
-    const std::size_t first = out.size();
-    for (const Function& f : functions()) {
-      DictionaryColumn c;
-      c.name = std::string(kNames[static_cast<int>(chain)]) + ": " + f.name;
-      c.variables = f.variables;
-      c.rows = Eigen::VectorXd::Zero(n);
-      out.push_back(std::move(c));
+  signals_ = std::move(signals);
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion})
+    if (data.has(chain)) chains_.push_back(chain);
+}
+
+std::size_t Dictionary::size() const noexcept {
+  return chains_.size() * functions().size();
+}
+
+Chain Dictionary::chain(std::size_t column) const {
+  return chains_[column / functions().size()];
+}
+
+std::string Dictionary::name(std::size_t column) const {
+  static constexpr const char* kNames[] = {"torque", "p1", "p2", "motion"};
+  return std::string(kNames[static_cast<int>(chain(column))]) + ": " +
+         functions()[column % functions().size()].name;
+}
+
+std::vector<std::string> Dictionary::variables(std::size_t column) const {
+  return functions()[column % functions().size()].variables;
+}
+
+Eigen::VectorXd Dictionary::rows(std::size_t column) const {
+  const auto& value = functions()[column % functions().size()].value;
+  const Scaled& top = signals_->top;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_->rows.size()));
+  for (std::size_t i = 0; i < data_->rows.size(); ++i) {
+    const Row& row = data_->rows[i];
+    if (row.chain != chain(column)) continue;
+    const PreparedRun& run = data_->runs[row.run];
+    const Signals::Extra& e = signals_->extra[row.run];
+    const std::size_t k = row.sample;
+    Scaled s{};
+    if (!run.angle.empty()) {
+      s.angle = run.angle[k] / top.angle;
+      s.velocity = run.velocity[k] / top.velocity;
+      s.sign = e.sign[k];
+      s.age = e.age[k];
     }
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Row& row = data.rows[static_cast<std::size_t>(i)];
-      if (row.chain != chain) continue;
-      const PreparedRun& run = data.runs[row.run];
-      const Extra& e = extra[row.run];
-      const std::size_t k = row.sample;
-      Scaled s{};
-      if (!run.angle.empty()) {
-        s.angle = run.angle[k] / top.angle;
-        s.velocity = run.velocity[k] / top.velocity;
-        s.sign = e.sign[k];
-        s.age = e.age[k];
-      }
-      if (run.has_pressure) {
-        s.dp = 0.5 * (run.pressure[1][k] - run.pressure[0][k]) / top.dp;
-        s.p0 = (0.5 * (run.pressure[1][k] + run.pressure[0][k]) - data.rig.initial_pressure) / top.p0;
-        s.rate1 = e.rate[0][k] / top.rate1;
-        s.rate2 = e.rate[1][k] / top.rate2;
-      }
-      s.time = run.time[k] / top.time;
-      s.day = (run.day_offset + run.time[k]) / top.day;
-      for (std::size_t f = 0; f < functions().size(); ++f) {
-        const double value = functions()[f].value(s);
-        out[first + f].rows[i] = std::isfinite(value) ? value : 0.0;
-      }
+    if (run.has_pressure) {
+      s.dp = 0.5 * (run.pressure[1][k] - run.pressure[0][k]) / top.dp;
+      s.p0 = (0.5 * (run.pressure[1][k] + run.pressure[0][k]) - data_->rig.initial_pressure) / top.p0;
+      s.rate1 = e.rate[0][k] / top.rate1;
+      s.rate2 = e.rate[1][k] / top.rate2;
     }
+    s.time = run.time[k] / top.time;
+    s.day = (run.day_offset + run.time[k]) / top.day;
+    const double v = value(s);
+    out[static_cast<Eigen::Index>(i)] = std::isfinite(v) ? v : 0.0;
   }
   return out;
 }

@@ -15,11 +15,16 @@ namespace {
 
 const char* subsystem_name(const Hypothesis& h) {
   switch (h.info().where) {
-    case models::Subsystem::kMuscle: return "muscle";
-    case models::Subsystem::kJoint: return "joint";
-    case models::Subsystem::kPcu: return "pcu";
-    case models::Subsystem::kSensor: return "sensor";
-    case models::Subsystem::kRig: return "rig";
+    case models::Subsystem::kMuscle:
+      return "muscle";
+    case models::Subsystem::kJoint:
+      return "joint";
+    case models::Subsystem::kPcu:
+      return "pcu";
+    case models::Subsystem::kSensor:
+      return "sensor";
+    case models::Subsystem::kRig:
+      return "rig";
   }
   return "";
 }
@@ -33,13 +38,12 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
   c.equation = h.info().equation;
   c.confidence = confidence;
   c.behind_best = trial.behind.t;
-  const Active& active = trial.fit.model.effects.back();
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto& p = h.info().parameters[i];
     Estimated e;
     e.name = p.name;
     e.unit = p.unit;
-    e.value = active.values[static_cast<std::size_t>(i)] / p.si_per_unit;
+    e.value = trial.values[static_cast<std::size_t>(i)] / p.si_per_unit;
     c.parameters.push_back(e);
   }
   return c;
@@ -48,24 +52,32 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
 void check_terms(const BaselineModel& baseline) {
   for (const std::string& term : baseline.terms)
     if (models::find_effect(term) < 0)
-      throw Error(ErrorKind::kUsage, "term_unknown", "the term '" + term + "' is not in the catalogue (docs/effects.md).");
+      throw Error(ErrorKind::kUsage, "term_unknown",
+                  "the term '" + term + "' is not in the catalogue (docs/effects.md).");
 }
 
 }  // namespace
 
 const char* to_string(Verdict verdict) noexcept {
   switch (verdict) {
-    case Verdict::kNone: return "none";
-    case Verdict::kImmaterial: return "immaterial";
-    case Verdict::kNamed: return "named";
-    case Verdict::kFamily: return "family";
-    case Verdict::kNotSeparable: return "not_separable";
-    case Verdict::kUnknown: return "unknown";
+    case Verdict::kNone:
+      return "none";
+    case Verdict::kImmaterial:
+      return "immaterial";
+    case Verdict::kNamed:
+      return "named";
+    case Verdict::kFamily:
+      return "family";
+    case Verdict::kNotSeparable:
+      return "not_separable";
+    case Verdict::kUnknown:
+      return "unknown";
   }
   return "";
 }
 
-Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout, const ExplainOptions& options) {
+Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout,
+                    const ExplainOptions& options) {
   check_terms(options.baseline);
   Prepared data = prepare(runs, options.rig, options.baseline, 4.0);
   const Library library = make_library(data, options.excluded);
@@ -92,7 +104,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       (t.in_set ? e.alternatives : e.rejected).push_back(candidate_of(library, t, t.weight));
       if (!t.in_set) continue;
       single = false;
-      one_family = one_family && family == family_of(library.hypotheses[static_cast<std::size_t>(t.hypothesis)].effect);
+      one_family = one_family &&
+                   family == family_of(library.hypotheses[static_cast<std::size_t>(t.hypothesis)].effect);
     }
   }
   if (!found.gate.significant) {
@@ -106,17 +119,24 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   }
   Chain chain = Chain::kTorque;
   if (!found.added.empty())
-    (void)size_over_floor(data, found.weights, found.floors, found.model.residual - found.baseline.residual, &chain);
+    (void)size_over_floor(data, found.weights, found.floors, found.model.residual - found.baseline.residual,
+                          &chain);
   const double scale = chain == Chain::kPressure1 || chain == Chain::kPressure2 ? 1 / kPascalPerKgfCm2 : 1.0;
-  e.gap.signal = chain == Chain::kTorque ? options.baseline.output : chain == Chain::kMotion ? "motion" : chain == Chain::kPressure1 ? "p1" : "p2";
-  e.gap.unit = chain == Chain::kTorque ? options.baseline.output_unit : chain == Chain::kMotion ? "N m" : "kg/cm2";
+  e.gap.signal = chain == Chain::kTorque      ? options.baseline.output
+                 : chain == Chain::kMotion    ? "motion"
+                 : chain == Chain::kPressure1 ? "p1"
+                                              : "p2";
+  e.gap.unit = chain == Chain::kTorque   ? options.baseline.output_unit
+               : chain == Chain::kMotion ? "N m"
+                                         : "kg/cm2";
   e.gap.before = scale * raw_residual(predictor, found.baseline.model, chain).rms();
   e.gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
   e.gap.noise_floor = scale * found.floors.white[static_cast<int>(chain)];
   const Proof proof(heldout, data);
   e.heldout_runs = proof.runs();
   if (proof.runs() > 0) {
-    const Sums before = proof.residual(found.baseline.model, chain), after = proof.residual(found.model.model, chain);
+    const Sums before = proof.residual(found.baseline.model, chain),
+               after = proof.residual(found.model.model, chain);
     e.gap.heldout_before = scale * before.rms();
     e.gap.heldout_after = scale * after.rms();
     e.gap.heldout_zero_model = scale * before.signal_rms();

@@ -36,9 +36,9 @@ struct SignalGap {
   std::string unit;
   double rmse = kNotKnown;         ///< of the baseline, on the fitted runs
   double noise_floor = kNotKnown;  ///< standard deviation of what is not repeatable, from the data
-  double p_value = 1;             ///< of "the residual is noise", over the whole search
+  double p_value = 1;              ///< of "the residual is noise", over the whole search
   double after = kNotKnown;        ///< rmse with the effects added
-  std::string floor_from;         ///< "repeats", "holds", "differences", "data sheet"
+  std::string floor_from;          ///< "repeats", "holds", "differences", "data sheet"
 };
 
 /// A region in which the disagreement sits.
@@ -62,16 +62,17 @@ struct Candidate {
   std::string equation;
   double confidence = kNotKnown;      ///< calibrated (docs/explain.md)
   std::vector<Estimated> parameters;  ///< in reporting units
-  double behind_best = 0;            ///< sigma by which it fits worse than the best; 0 for the best
+  double behind_best = 0;             ///< sigma by which it fits worse than the best; 0 for the best
   double closes = kNotKnown;          ///< share of the explainable squared residual
-  std::vector<Evidence> evidence;    ///< sentences for and against
+  std::vector<Evidence> evidence;     ///< sentences for and against
 };
 
 struct Unknown {
   std::string subsystem, signal;
-  std::vector<std::string> depends_on;   ///< "angle", "velocity", "delta_pressure", "mean_pressure", "time", "memory"
+  std::vector<std::string>
+      depends_on;  ///< "angle", "velocity", "delta_pressure", "mean_pressure", "time", "memory"
   std::vector<std::string> independent;  ///< variables that were tried and do not matter
-  double share = kNotKnown;               ///< of the explainable squared residual that the shape takes
+  double share = kNotKnown;              ///< of the explainable squared residual that the shape takes
   /// The shape over its first variable: centre of the bin, mean residual, half width of the 95 % band.
   std::vector<double> at, shape, band;
   std::string variable, variable_unit, unit;
@@ -94,8 +95,8 @@ struct PlannedRun {
 };
 
 struct NextExperiment {
-  std::string sentence;              ///< for the person at the rig
-  std::vector<PlannedRun> runs;      ///< empty where only a change of the rig helps
+  std::string sentence;          ///< for the person at the rig
+  std::vector<PlannedRun> runs;  ///< empty where only a change of the rig helps
   std::string separates_a, separates_b;
   double separation_now = kNotKnown, separation_expected = kNotKnown;  ///< sigma
 };
@@ -125,7 +126,7 @@ struct BaseChange {
 struct RunTrace {
   std::string run, signal, unit;
   bool heldout = false;
-  std::vector<double> time, measured, before, after;           ///< predictions of the baseline and with the effects
+  std::vector<double> time, measured, before, after;  ///< predictions of the baseline and with the effects
   std::vector<double> angle, velocity, delta_pressure, mean_pressure;  ///< rad, rad/s, kg/cm2; may be empty
 };
 

@@ -13,7 +13,9 @@ namespace {
 constexpr double kDifference = 1e-4;  // of a coordinate's scale
 
 void set(ModelPoint& model, const Coordinate& c, double value) {
-  if (c.base >= 0) {
+  if (c.rest >= 0) {
+    model.rest[static_cast<std::size_t>(c.rest)] = value;
+  } else if (c.base >= 0) {
     model.base[static_cast<std::size_t>(c.base)] = value;
   } else {
     model.effects[static_cast<std::size_t>(c.effect)].values[static_cast<std::size_t>(c.component)] = value;
@@ -29,14 +31,16 @@ Coordinate effect_coordinate(const Active& active, int effect, int component, bo
   c.lower = h.lower[k];
   c.upper = h.upper[k];
   const auto& info = h.info().parameters[component];
-  c.scale = tolerance ? 0.5 * (c.upper - c.lower) : std::max(std::abs(info.typical), std::abs(active.values[k]));
+  c.scale =
+      tolerance ? 0.5 * (c.upper - c.lower) : std::max(std::abs(info.typical), std::abs(active.values[k]));
   if (!(c.scale > 0)) c.scale = 1;
   c.chains = h.chains;
   c.tolerance = tolerance;
   return c;
 }
 
-void add_base(const Predictor& predictor, const ModelPoint& model, unsigned chains, std::vector<Coordinate>& out) {
+void add_base(const Predictor& predictor, const ModelPoint& model, unsigned chains,
+              std::vector<Coordinate>& out) {
   for (std::size_t j = 0; j < predictor.base().size(); ++j) {
     const BaseParameter& b = predictor.base()[j];
     if ((b.chains & chains) == 0) continue;
@@ -46,6 +50,22 @@ void add_base(const Predictor& predictor, const ModelPoint& model, unsigned chai
     c.upper = b.upper;
     c.scale = std::max(std::abs(b.start), 1e-3 * std::abs(model.base[j]));
     c.chains = b.chains;
+    out.push_back(c);
+  }
+}
+
+/// Where within a step of the encoder each resting run stands.
+void add_rest(const Predictor& predictor, ModelPoint& model, unsigned chains, std::vector<Coordinate>& out) {
+  if (predictor.resting_runs().empty() || (chains & bit(Chain::kTorque)) == 0) return;
+  model.rest.resize(predictor.data().runs.size(), 0.0);
+  for (const std::size_t run : predictor.resting_runs()) {
+    Coordinate c;
+    c.rest = static_cast<int>(run);
+    c.upper = predictor.data().rig.angle_step;
+    c.lower = -c.upper;
+    c.scale = c.upper;
+    c.chains = bit(Chain::kTorque);
+    c.tolerance = true;
     out.push_back(c);
   }
 }
@@ -64,16 +84,29 @@ bool reads_force(const ModelPoint& model) {
 }
 
 /// Derivative of all rows by one coordinate; other chains' rows are left as they are.
-void differentiate(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here, const Coordinate& c,
-                   double value, Eigen::VectorXd& out) {
+void differentiate(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here,
+                   const Coordinate& c, double value, Eigen::VectorXd& out) {
   ModelPoint there = model;
+  if (c.rest >= 0) {
+    const Prepared& data = predictor.data();
+    const auto run = static_cast<std::size_t>(c.rest);
+    out.setZero();
+    for (std::size_t i = data.run_begin[run]; i < data.run_begin[run + 1]; ++i)
+      if (data.rows[i].chain == Chain::kTorque)
+        out[static_cast<Eigen::Index>(i)] = predictor.stiffness(model);
+    return;
+  }
   if (c.base >= 0 && (c.chains & kPressureChains) == 0 && !reads_force(model)) {
     // Linear: the prediction of a baseline that consists of this term alone.
     std::fill(there.base.begin(), there.base.begin() + static_cast<std::ptrdiff_t>(there.base.size()), 0.0);
     for (std::size_t j = 0; j < there.base.size(); ++j)
       if ((predictor.base()[j].chains & kPressureChains) != 0) there.base[j] = model.base[j];
     there.base[static_cast<std::size_t>(c.base)] = c.scale;
-    std::erase_if(there.effects, [](const Active& a) { return !(a.hypothesis->reads_angle || a.hypothesis->reads_pressure || a.hypothesis->info().hook == models::Hook::kMusclePressure); });
+    there.rest.clear();
+    std::erase_if(there.effects, [](const Active& a) {
+      return !(a.hypothesis->reads_angle || a.hypothesis->reads_pressure ||
+               a.hypothesis->info().hook == models::Hook::kMusclePressure);
+    });
     predictor.predict(there, c.chains, out);
     out /= c.scale;
     return;
@@ -92,27 +125,33 @@ void differentiate(const Predictor& predictor, const ModelPoint& model, const Ei
 
 class Rows final : public ceres::CostFunction {
  public:
-  Rows(const Predictor& predictor, ModelPoint model, std::vector<Coordinate> coordinates, const Weights& weights,
-       unsigned chains)
-      : predictor_(predictor), model_(std::move(model)), coordinates_(std::move(coordinates)), chains_(chains),
+  Rows(const Predictor& predictor, ModelPoint model, std::vector<Coordinate> coordinates,
+       const Weights& weights, unsigned chains)
+      : predictor_(predictor),
+        model_(std::move(model)),
+        coordinates_(std::move(coordinates)),
+        chains_(chains),
         rows_(rows_of(predictor.data(), chains)) {
     set_num_residuals(static_cast<int>(rows_.size()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(coordinates_.size()));
     weight_.resize(static_cast<Eigen::Index>(rows_.size()));
     for (std::size_t i = 0; i < rows_.size(); ++i)
       weight_[static_cast<Eigen::Index>(i)] =
-          1 / weights.sigma[static_cast<int>(predictor.data().rows[static_cast<std::size_t>(rows_[i])].chain)];
+          1 /
+          weights.sigma[static_cast<int>(predictor.data().rows[static_cast<std::size_t>(rows_[i])].chain)];
   }
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     ModelPoint model = model_;
-    for (std::size_t j = 0; j < coordinates_.size(); ++j) set(model, coordinates_[j], parameters[0][j] * coordinates_[j].scale);
+    for (std::size_t j = 0; j < coordinates_.size(); ++j)
+      set(model, coordinates_[j], parameters[0][j] * coordinates_[j].scale);
     Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_.rows()));
     predictor_.predict(model, chains_, here);
     const Eigen::VectorXd& measured = predictor_.measured();
     const std::size_t n = rows_.size(), m = coordinates_.size();
     for (std::size_t i = 0; i < n; ++i)
       residuals[i] = (here[rows_[i]] - measured[rows_[i]]) * weight_[static_cast<Eigen::Index>(i)];
+    if (!std::all_of(residuals, residuals + n, [](double r) { return std::isfinite(r); })) return false;
     if (jacobians == nullptr || jacobians[0] == nullptr) return true;
     Eigen::VectorXd column = here;
     for (std::size_t j = 0; j < m; ++j) {
@@ -120,8 +159,11 @@ class Rows final : public ceres::CostFunction {
       column = here;
       differentiate(predictor_, model, here, c, parameters[0][j] * c.scale, column);
       for (std::size_t i = 0; i < n; ++i) {
-        const bool touched = (bit(predictor_.data().rows[static_cast<std::size_t>(rows_[i])].chain) & c.chains) != 0;
-        jacobians[0][i * m + j] = touched ? column[rows_[i]] * weight_[static_cast<Eigen::Index>(i)] * c.scale : 0.0;
+        const bool touched =
+            (bit(predictor_.data().rows[static_cast<std::size_t>(rows_[i])].chain) & c.chains) != 0;
+        const double slope =
+            touched ? column[rows_[i]] * weight_[static_cast<Eigen::Index>(i)] * c.scale : 0.0;
+        jacobians[0][i * m + j] = std::isfinite(slope) ? slope : 0.0;
       }
     }
     return true;
@@ -160,7 +202,8 @@ void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int ite
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   fit.converged = summary.IsSolutionUsable();
-  for (std::size_t j = 0; j < x.size(); ++j) set(fit.model, fit.coordinates[j], x[j] * fit.coordinates[j].scale);
+  for (std::size_t j = 0; j < x.size(); ++j)
+    set(fit.model, fit.coordinates[j], x[j] * fit.coordinates[j].scale);
   // The rows that were refitted; the others stay.
   Eigen::VectorXd prediction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(fit.model, fit.chains, prediction);
@@ -194,11 +237,14 @@ unsigned closure(unsigned chains, const ModelPoint& model) {
 }  // namespace
 
 double Fit::value(const Coordinate& c) const {
+  if (c.rest >= 0) return model.rest[static_cast<std::size_t>(c.rest)];
   return c.base >= 0 ? model.base[static_cast<std::size_t>(c.base)]
-                     : model.effects[static_cast<std::size_t>(c.effect)].values[static_cast<std::size_t>(c.component)];
+                     : model.effects[static_cast<std::size_t>(c.effect)]
+                           .values[static_cast<std::size_t>(c.component)];
 }
 
-Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances, const Weights& weights) {
+Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances,
+                 const Weights& weights) {
   Fit fit;
   for (const BaseParameter& b : predictor.base()) fit.model.base.push_back(b.start);
   for (const Hypothesis& h : tolerances) {
@@ -210,12 +256,13 @@ Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tole
   add_base(predictor, fit.model, kAllChains, fit.coordinates);
   for (std::size_t i = 0; i < tolerances.size(); ++i)
     fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
+  add_rest(predictor, fit.model, kAllChains, fit.coordinates);
   solve(predictor, fit, weights, 30);
   return fit;
 }
 
-Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects, const Weights& weights,
-          int iterations) {
+Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
+          const Weights& weights, int iterations) {
   Fit fit;
   fit.model = start.model;
   fit.tolerances = start.tolerances;
@@ -230,12 +277,15 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
   }
   fit.chains = closure(chains, fit.model);
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
+  add_rest(predictor, fit.model, fit.chains, fit.coordinates);
   for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
     const Active& a = fit.model.effects[i];
     if ((a.hypothesis->chains & fit.chains) == 0) continue;
     const bool tolerance = i < fit.tolerances;
-    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances), fit.model.effects.end(),
-                                 [&](const Active& other) { return other.hypothesis->effect == a.hypothesis->effect; }))
+    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
+                                 fit.model.effects.end(), [&](const Active& other) {
+                                   return other.hypothesis->effect == a.hypothesis->effect;
+                                 }))
       continue;
     for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
       if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
@@ -250,11 +300,17 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   // All chains, also those that the last refit left alone.
   std::vector<Coordinate> all;
   add_base(predictor, fit.model, kAllChains, all);
+  {
+    ModelPoint ignored = fit.model;
+    add_rest(predictor, ignored, kAllChains, all);
+  }
   for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
     const Active& a = fit.model.effects[i];
     const bool tolerance = i < fit.tolerances;
-    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances), fit.model.effects.end(),
-                                 [&](const Active& other) { return other.hypothesis->effect == a.hypothesis->effect; }))
+    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
+                                 fit.model.effects.end(), [&](const Active& other) {
+                                   return other.hypothesis->effect == a.hypothesis->effect;
+                                 }))
       continue;
     for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
       if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
@@ -267,12 +323,15 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   Eigen::Index columns = 0;
   for (const Coordinate& c : all) {
     const double value = fit.value(c), margin = 1e-3 * (c.upper - c.lower);
-    if (c.base < 0 && (value < c.lower + (c.tolerance ? margin : 0) || value > c.upper - (c.tolerance ? margin : 0))) continue;
+    if (c.base < 0 &&
+        (value < c.lower + (c.tolerance ? margin : 0) || value > c.upper - (c.tolerance ? margin : 0)))
+      continue;
     Eigen::VectorXd column = here;
     differentiate(predictor, fit.model, here, c, value, column);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Chain chain = predictor.data().rows[static_cast<std::size_t>(i)].chain;
-      out(i, columns) = (bit(chain) & c.chains) != 0 ? column[i] * c.scale / weights.sigma[static_cast<int>(chain)] : 0.0;
+      out(i, columns) =
+          (bit(chain) & c.chains) != 0 ? column[i] * c.scale / weights.sigma[static_cast<int>(chain)] : 0.0;
     }
     ++columns;
     if (used != nullptr) used->push_back(c);
@@ -281,8 +340,8 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   return out;
 }
 
-Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here, const Active& effect,
-                         const Weights& weights) {
+Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
+                         const Active& effect, const Weights& weights) {
   Eigen::VectorXd after = here;
   ModelPoint with = fit.model;
   with.effects.push_back(effect);

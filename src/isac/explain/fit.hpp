@@ -24,6 +24,7 @@ struct Weights {
 struct Coordinate {
   int base = -1;                    ///< index in the baseline, or −1
   int effect = -1, component = -1;  ///< of model.effects, else −1
+  int rest = -1;                    ///< run whose resting angle it is, else −1
   double lower = 0, upper = 0, scale = 1;
   unsigned chains = 0;
   bool tolerance = false;
@@ -50,12 +51,13 @@ struct Fit {
 
 /// Weighted derivative of the rows by each coordinate that is inside its bounds; columns in the order of `coordinates`,
 /// `used` says which.
-[[nodiscard]] Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const Weights& weights,
-                                            std::vector<Coordinate>* used = nullptr);
+[[nodiscard]] Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit,
+                                            const Weights& weights, std::vector<Coordinate>* used = nullptr);
 
 /// Weighted difference of the rows when an effect is added to the fit's model, nothing refitted. `here` is the model's own
 /// prediction of all rows.
-[[nodiscard]] Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
-                                       const Active& effect, const Weights& weights);
+[[nodiscard]] Eigen::VectorXd response(const Predictor& predictor, const Fit& fit,
+                                       const Eigen::VectorXd& here, const Active& effect,
+                                       const Weights& weights);
 
 }  // namespace isac::explain

@@ -17,8 +17,8 @@ using std::string_view;
 
 /// How far the data reaches: what shapes are worth a start.
 struct Reach {
-  double angle_low = 0, angle_high = 0, speed = 0, pressure_low = 0, pressure_high = 0, command_high = 0, rate = 0,
-         force = 0, run_seconds = 0, day_seconds = 0, interval = 0.002;
+  double angle_low = 0, angle_high = 0, speed = 0, pressure_low = 0, pressure_high = 0, command_high = 0,
+         rate = 0, force = 0, run_seconds = 0, day_seconds = 0, interval = 0.002;
 };
 
 Reach reach_of(const Prepared& data) {
@@ -67,8 +67,7 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
     const double far = std::max(r.angle_high, -r.angle_low);
     return {0.4 * far, 0.65 * far, 0.85 * far};
   }
-  if (id == "end_stop" && at == 1)
-    return {0.55 * r.angle_high, 0.8 * r.angle_high, 0.93 * r.angle_high, 3.0};
+  if (id == "end_stop" && at == 1) return {0.55 * r.angle_high, 0.8 * r.angle_high, 0.93 * r.angle_high, 3.0};
   if (id == "end_stop" && at == 2) return {0.55 * r.angle_low, 0.8 * r.angle_low, 0.93 * r.angle_low, -3.0};
   if (id == "torque_ripple" && at == 2) {
     std::vector<double> grid;
@@ -78,7 +77,8 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   }
   if (id == "flow_limit" && at == 0) return {0.35 * r.rate, 0.6 * r.rate, 0.85 * r.rate};
   if (id == "force_saturation" && at == 0) return {0.75 * r.force, 0.88 * r.force, 0.97 * r.force};
-  if (id == "supply_droop" && at == 0) return {0.75 * r.command_high, 0.9 * r.command_high, 1.05 * r.command_high};
+  if (id == "supply_droop" && at == 0)
+    return {0.75 * r.command_high, 0.9 * r.command_high, 1.05 * r.command_high};
   if (id == "supply_droop" && at == 1) return {0.0, 0.3};
   if (id == "supply_droop" && at == 2) return {1.0};
   if (id == "threshold_pressure" && at == 0) {
@@ -110,7 +110,9 @@ std::vector<Values> shapes_of(const EffectInfo& info, const Reach& reach) {
     shapes = std::move(more);
   }
   // A stop with both sides out of reach is none.
-  std::erase_if(shapes, [&](const Values& s) { return string_view(info.id) == "end_stop" && s[1] > 2.9 && s[2] < -2.9; });
+  std::erase_if(shapes, [&](const Values& s) {
+    return string_view(info.id) == "end_stop" && s[1] > 2.9 && s[2] < -2.9;
+  });
   return shapes;
 }
 
@@ -219,7 +221,8 @@ Values null_values(const Hypothesis& hypothesis, const Values& shape) {
   Values values = shape;
   const EffectInfo& info = hypothesis.info();
   for (int i = 0; i < info.parameter_count; ++i)
-    if (!std::isnan(info.parameters[i].null_value)) values[static_cast<std::size_t>(i)] = info.parameters[i].null_value;
+    if (!std::isnan(info.parameters[i].null_value))
+      values[static_cast<std::size_t>(i)] = info.parameters[i].null_value;
   return values;
 }
 
@@ -233,15 +236,18 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
     return std::find(excluded.begin(), excluded.end(), id) != excluded.end();
   };
   const auto in_baseline = [&](const char* id) {
-    if (seed) return one_of(id, {"stiffness", "pressure", "cubic_damping", "viscous_damping", "inertia", "offset"});
-    return std::any_of(data.baseline.terms.begin(), data.baseline.terms.end(),
-                       [&](const std::string& term) { return models::find_effect(term) == models::find_effect(id); });
+    if (seed)
+      return one_of(id, {"stiffness", "pressure", "cubic_damping", "viscous_damping", "inertia", "offset"});
+    return std::any_of(data.baseline.terms.begin(), data.baseline.terms.end(), [&](const std::string& term) {
+      return models::find_effect(term) == models::find_effect(id);
+    });
   };
   for (int e = 0; e < static_cast<int>(catalogue.size()); ++e) {
     const EffectInfo& info = catalogue[static_cast<unsigned>(e)];
     const string_view id = info.id;
     if (in_baseline(info.id) || is_excluded(info.id) || info.hook == Hook::kOutlier) continue;
-    if (one_of(id, {"mains_hum", "periodic_disturbance"})) continue;  // found by their spectrum (spectrum.hpp)
+    if (one_of(id, {"mains_hum", "periodic_disturbance"}))
+      continue;  // found by their spectrum (spectrum.hpp)
     if (!seed) {
       // A sum of terms has no forces, pressures or motion of its own: torques on the output, and the angle's sensor.
       if (info.hook != Hook::kTorque && !touches(e, info).angle) continue;
@@ -274,7 +280,8 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       also([](Hypothesis& o) { o.seen_by = SeenBy::kForceSensors, o.chains = bit(Chain::kTorque); });
     if (one_of(id, {"stribeck_friction", "hysteresis"}))
       also([](Hypothesis& o) { o.seen_by = SeenBy::kMotionOnly, o.chains = bit(Chain::kMotion); });
-    if (one_of(id, {"thermal_drift", "force_drift", "encoder_drift"}) && reach.day_seconds > 1.5 * reach.run_seconds)
+    if (one_of(id, {"thermal_drift", "force_drift", "encoder_drift"}) &&
+        reach.day_seconds > 1.5 * reach.run_seconds)
       also([](Hypothesis& o) { o.clock = Clock::kDay; });
   }
 
@@ -305,34 +312,43 @@ const char* family_of(int effect) noexcept {
     return "rate-independent dissipation";
   if (one_of(id, {"viscous_damping", "cubic_damping", "quadratic_damping", "pressure_dependent_damping"}))
     return "viscous damping";
-  if (one_of(id, {"cubic_stiffness", "pressure_dependent_stiffness", "quadratic_pressure_angle", "tension_loss",
-                  "end_stop", "lever_arm_variation", "torque_ripple", "nonlinear_pressure_gain"}))
+  if (one_of(id,
+             {"cubic_stiffness", "pressure_dependent_stiffness", "quadratic_pressure_angle", "tension_loss",
+              "end_stop", "lever_arm_variation", "torque_ripple", "nonlinear_pressure_gain"}))
     return "elasticity and geometry";
   if (one_of(id, {"threshold_pressure"})) return "muscle at low pressure";
   if (one_of(id, {"dead_time", "second_order_lag", "sensor_lag", "time_skew", "series_elasticity"}))
     return "delay and lag";
-  if (one_of(id, {"asymmetric_fill_vent", "flow_limit", "valve_deadband", "valve_hysteresis", "supply_droop"}))
+  if (one_of(id,
+             {"asymmetric_fill_vent", "flow_limit", "valve_deadband", "valve_hysteresis", "supply_droop"}))
     return "nonlinear valve";
   if (one_of(id, {"creep", "thermal_drift", "force_drift", "encoder_drift"})) return "slow change";
-  if (one_of(id, {"torque_offset", "muscle_asymmetry", "force_offset", "encoder_offset", "pressure_offset",
-                  "pressure_gain_error", "pressure_sensor_gain", "force_gain_error", "encoder_gain", "offset"}))
+  if (one_of(id,
+             {"torque_offset", "muscle_asymmetry", "force_offset", "encoder_offset", "pressure_offset",
+              "pressure_gain_error", "pressure_sensor_gain", "force_gain_error", "encoder_gain", "offset"}))
     return "calibration";
   return "something else that moves";
 }
 
 bool nests(const std::string& general, const std::string& simple) noexcept {
-  static constexpr const char* kPairs[][2] = {
-      {"stribeck_friction", "coulomb_friction"},      {"pressure_dependent_friction", "coulomb_friction"},
-      {"hysteresis", "coulomb_friction"},             {"asymmetric_hysteresis", "hysteresis"},
-      {"asymmetric_hysteresis", "coulomb_friction"},  {"thermal_drift", "torque_offset"},
-      {"gravity_imbalance", "torque_offset"},         {"force_offset", "torque_offset"},
-      {"pressure_offset", "torque_offset"},           {"force_gain_error", "force_offset"},
-      {"lever_arm_variation", "quadratic_pressure_angle"}, {"stribeck_friction", "bearing_friction"},
-      {"hysteresis", "bearing_friction"},             {"supply_droop", "pressure_gain_error"},
-      {"series_elasticity", "inertia_error"},         {"end_stop", "tension_loss"}};
-  return std::any_of(std::begin(kPairs), std::end(kPairs), [&](const auto& pair) {
-    return general == pair[0] && simple == pair[1];
-  });
+  static constexpr const char* kPairs[][2] = {{"stribeck_friction", "coulomb_friction"},
+                                              {"pressure_dependent_friction", "coulomb_friction"},
+                                              {"hysteresis", "coulomb_friction"},
+                                              {"asymmetric_hysteresis", "hysteresis"},
+                                              {"asymmetric_hysteresis", "coulomb_friction"},
+                                              {"thermal_drift", "torque_offset"},
+                                              {"gravity_imbalance", "torque_offset"},
+                                              {"force_offset", "torque_offset"},
+                                              {"pressure_offset", "torque_offset"},
+                                              {"force_gain_error", "force_offset"},
+                                              {"lever_arm_variation", "quadratic_pressure_angle"},
+                                              {"stribeck_friction", "bearing_friction"},
+                                              {"hysteresis", "bearing_friction"},
+                                              {"supply_droop", "pressure_gain_error"},
+                                              {"series_elasticity", "inertia_error"},
+                                              {"end_stop", "tension_loss"}};
+  return std::any_of(std::begin(kPairs), std::end(kPairs),
+                     [&](const auto& pair) { return general == pair[0] && simple == pair[1]; });
 }
 
 }  // namespace isac::explain

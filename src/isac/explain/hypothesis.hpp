@@ -25,7 +25,9 @@ enum class Clock : unsigned char { kRun, kDay };
 enum class SeenBy : unsigned char { kForceSensors, kMotionOnly };
 
 /// Chains as bits.
-[[nodiscard]] constexpr unsigned bit(Chain chain) noexcept { return 1U << static_cast<unsigned>(chain); }
+[[nodiscard]] constexpr unsigned bit(Chain chain) noexcept {
+  return 1U << static_cast<unsigned>(chain);
+}
 inline constexpr unsigned kPressureChains = bit(Chain::kPressure1) | bit(Chain::kPressure2);
 inline constexpr unsigned kForceChains = bit(Chain::kTorque) | bit(Chain::kMotion);
 inline constexpr unsigned kAllChains = kPressureChains | kForceChains;
@@ -34,13 +36,14 @@ struct Hypothesis {
   int effect = -1;  ///< index in the catalogue
   Clock clock = Clock::kRun;
   SeenBy seen_by = SeenBy::kForceSensors;
-  bool dry = false;      ///< its torque jumps with the direction of motion
+  bool dry = false;  ///< its torque jumps with the direction of motion
   bool reads_angle = false, reads_force = false, reads_pressure = false;  ///< sensors that it changes
-  unsigned chains = 0;   ///< that it changes
+  unsigned chains = 0;                                                    ///< that it changes
   std::vector<Values> shapes;  ///< starts; amplitudes at their typical values
   Values lower{}, upper{};
-  std::array<bool, models::kMaxEffectParameters> free{};       ///< fitted; the others stay as the shape says
-  std::array<bool, models::kMaxEffectParameters> amplitude{};  ///< the effect is absent with these at their null
+  std::array<bool, models::kMaxEffectParameters> free{};  ///< fitted; the others stay as the shape says
+  std::array<bool, models::kMaxEffectParameters>
+      amplitude{};  ///< the effect is absent with these at their null
 
   [[nodiscard]] const models::EffectInfo& info() const noexcept {
     return models::effect_catalogue()[static_cast<unsigned>(effect)];

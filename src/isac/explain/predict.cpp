@@ -1,6 +1,7 @@
 #include "isac/explain/predict.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "isac/core/units.hpp"
@@ -19,14 +20,18 @@ double time_of(const Hypothesis& h, const PreparedRun& run, std::size_t k) {
   return run.time[k] + (h.clock == Clock::kDay ? run.day_offset : 0.0);
 }
 
-bool is_null(const Active& a) { return null_values(*a.hypothesis, a.values) == a.values; }
+bool is_null(const Active& a) {
+  return null_values(*a.hypothesis, a.values) == a.values;
+}
 
 /// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
 /// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
 class Memory {
  public:
   Memory(const Active& active) : active_(active), count_(active.hypothesis->info().state_count) {}
-  void rest(const JointPoint<double>& x) { models::effect_rest(active_.hypothesis->effect, active_.values.data(), x, z_); }
+  void rest(const JointPoint<double>& x) {
+    models::effect_rest(active_.hypothesis->effect, active_.values.data(), x, z_);
+  }
   const double* state() const { return z_; }
   void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
     JointPoint<double> middle = to;
@@ -84,14 +89,44 @@ double linear_between(const std::vector<double>& x, double at) {
 
 }  // namespace
 
+namespace {
+
+JointPoint<double> point_at(const RigFacts& rig, double stiffness, double pressure_gain,
+                            const std::vector<double>& angle, const std::vector<double>& velocity,
+                            const std::vector<double>& acceleration,
+                            const std::vector<double>* const (&pressure)[2], double time, std::size_t k) {
+  JointPoint<double> x;
+  x.angle = angle[k];
+  x.velocity = velocity[k];
+  x.acceleration = acceleration[k];
+  if (pressure[0] != nullptr && !pressure[0]->empty()) {
+    const double p1 = (*pressure[0])[k], p2 = (*pressure[1])[k];
+    x.delta_pressure = 0.5 * (p2 - p1);
+    x.mean_pressure = 0.5 * (p1 + p2);
+  }
+  x.time = time;
+  x.wheel_radius = std::isfinite(rig.wheel_radius) ? rig.wheel_radius : 1.0;
+  x.reference_pressure = rig.initial_pressure;
+  x.stiffness = stiffness;
+  x.pressure_gain = pressure_gain;
+  return x;
+}
+
+}  // namespace
+
 /// What enters the equations: the measured signals, or what they were before sensors changed them.
 struct Predictor::Inputs {
-  const std::vector<double>*angle = nullptr, *velocity = nullptr, *acceleration = nullptr, *dry = nullptr, *slow_acceleration = nullptr;
+  const std::vector<double>*angle = nullptr, *velocity = nullptr, *acceleration = nullptr, *dry = nullptr,
+        *slow_acceleration = nullptr;
   const std::vector<double>* pressure[2] = {nullptr, nullptr};
-  std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration, own_pressure[2];
+  std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration,
+      own_pressure[2];
+  std::vector<double> columns;  ///< row-major: rows of the torque chain × terms
 };
 
 Predictor::Predictor(const Prepared& data) : data_(&data) {
+  static std::atomic<std::uint64_t> made{0};
+  identity_ = ++made;
   const bool seed = data.baseline.terms.empty();
   const std::vector<std::string> names =
       seed ? std::vector<std::string>{"A", "B", "C", "D"} : data.baseline.terms;
@@ -103,15 +138,39 @@ Predictor::Predictor(const Prepared& data) : data_(&data) {
     term_sign_.push_back(data.baseline.driven && !info.added_to_output ? -1.0 : 1.0);
     if (std::string_view(info.id) == "stiffness") stiffness_ = static_cast<int>(base_.size());
     if (std::string_view(info.id) == "pressure") pressure_gain_ = static_cast<int>(base_.size());
-    base_.push_back({.name = seed ? name : p.name, .unit = p.unit, .si_per_unit = p.si_per_unit, .start = p.typical,
-                     .lower = seed ? -1e9 : p.lower, .upper = seed ? 1e9 : p.upper, .chains = bit(Chain::kTorque)});
+    base_.push_back({.name = seed ? name : p.name,
+                     .unit = p.unit,
+                     .si_per_unit = p.si_per_unit,
+                     .start = p.typical,
+                     .lower = seed ? -1e9 : p.lower,
+                     .upper = seed ? 1e9 : p.upper,
+                     .chains = bit(Chain::kTorque)});
     if (!seed) base_.back().lower = std::min(base_.back().lower, -1e9);
   }
   if (data.has(Chain::kPressure1) || data.has(Chain::kPressure2)) {
     gain_ = static_cast<int>(base_.size());
-    base_.push_back({.name = "K_C", .unit = "-", .si_per_unit = 1, .start = 1, .lower = 0.3, .upper = 3, .chains = kPressureChains});
+    base_.push_back({.name = "K_C",
+                     .unit = "-",
+                     .si_per_unit = 1,
+                     .start = 1,
+                     .lower = 0.3,
+                     .upper = 3,
+                     .chains = kPressureChains});
     lag_ = static_cast<int>(base_.size());
-    base_.push_back({.name = "T_C", .unit = "s", .si_per_unit = 1, .start = 0.17, .lower = 0.005, .upper = 3, .chains = kPressureChains});
+    base_.push_back({.name = "T_C",
+                     .unit = "s",
+                     .si_per_unit = 1,
+                     .start = 0.17,
+                     .lower = 0.005,
+                     .upper = 3,
+                     .chains = kPressureChains});
+  }
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const auto& angle = data.runs[r].raw_angle;
+    if (angle.empty() || !data.runs[r].has_torque || stiffness_ < 0 || !std::isfinite(data.rig.angle_step))
+      continue;
+    const auto [low, high] = std::minmax_element(angle.begin(), angle.end());
+    if (*high - *low <= 2.01 * data.rig.angle_step) resting_.push_back(r);
   }
   measured_.resize(static_cast<Eigen::Index>(rows()));
   for (std::size_t i = 0; i < rows(); ++i) {
@@ -119,14 +178,113 @@ Predictor::Predictor(const Prepared& data) : data_(&data) {
     const PreparedRun& run = data.runs[row.run];
     const std::size_t k = row.sample;
     measured_[static_cast<Eigen::Index>(i)] =
-        row.chain == Chain::kTorque ? run.smooth_torque[k]
+        row.chain == Chain::kTorque   ? run.smooth_torque[k]
         : row.chain == Chain::kMotion ? run.slow_torque[k]
-                                      : run.pressure[row.chain == Chain::kPressure1 ? 0 : 1][k];
+                                      : run.smooth_pressure[row.chain == Chain::kPressure1 ? 0 : 1][k];
   }
 }
 
-Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRun& run) const {
-  Inputs in;
+/// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot.
+void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const {
+  std::vector<const Active*> readings;
+  bool smooth = true;
+  for (const Active& a : model.effects) {
+    if (!a.hypothesis->reads_angle || a.hypothesis->info().hook == Hook::kDelay || is_null(a)) continue;
+    readings.push_back(&a);
+    smooth = smooth && a.hypothesis->info().linear;
+  }
+  const std::size_t n = run.raw_angle.size();
+  const double dt = run.interval;
+  std::vector<double> truth = smooth ? run.angle : run.raw_angle;
+  for (auto it = readings.rbegin(); it != readings.rend(); ++it) {  // the last first
+    const Hypothesis& h = *(*it)->hypothesis;
+    const double* q = (*it)->values.data();
+    const std::vector<double> read = truth;
+    for (int round = 0; round < (h.info().state_count > 0 ? 1 : kInversions); ++round) {
+      double z[models::kMaxEffectStates] = {};
+      models::Readings<double> y;
+      y.angle = read[0];
+      models::effect_reading_rest(h.effect, q, y, z);
+      for (std::size_t k = 0; k < n; ++k) {
+        y.angle = truth[k];
+        models::effect_reading_step(h.effect, q, y, z);
+        const double before = y.angle;
+        models::effect_reading(h.effect, q, time_of(h, run, k), z, y);
+        truth[k] = read[k] - (y.angle - before);
+      }
+    }
+  }
+  const bool slow = !run.slow_acceleration.empty();
+  if (smooth) {
+    in.own_velocity = run.velocity;
+    in.own_acceleration = run.acceleration;
+    if (slow) in.own_slow_acceleration = run.slow_acceleration;
+    // φ_true = φ − δ with δ linear in φ and in t: the slopes of δ from two angles and two times.
+    double by_angle = 0, by_time = 0;
+    for (const Active* a : readings) {
+      const auto delta = [&](double angle, double time) {
+        models::Readings<double> y;
+        y.angle = angle;
+        models::effect_reading(a->hypothesis->effect, a->values.data(), time,
+                               static_cast<const double*>(nullptr), y);
+        return y.angle - angle;
+      };
+      by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
+      by_time += delta(0, 1) - delta(0, 0);
+    }
+    const double ratio = 1 / (1 + by_angle);
+    for (std::size_t k = 0; k < n; ++k) {
+      in.own_velocity[k] = (run.velocity[k] - by_time) * ratio;
+      in.own_acceleration[k] = run.acceleration[k] * ratio;
+      if (slow) in.own_slow_acceleration[k] = run.slow_acceleration[k] * ratio;
+    }
+    in.own_angle = std::move(truth);
+  } else {
+    const double sigma = data_->smoothing.torque / dt;
+    in.own_angle = low_pass(truth, sigma);
+    in.own_velocity = low_pass_derivative(truth, sigma, dt, 1);
+    in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
+    if (slow) in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
+  }
+  in.angle = &in.own_angle;
+  in.velocity = &in.own_velocity;
+  in.acceleration = &in.own_acceleration;
+  if (slow) in.slow_acceleration = &in.own_slow_acceleration;
+}
+
+/// Inputs of the last model on this run that changed them the same way: most models of a search differ elsewhere.
+std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
+                                                              std::size_t index) const {
+  std::vector<double> key;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (!(h.reads_angle || h.reads_pressure || h.info().hook == Hook::kMusclePressure) || is_null(a))
+      continue;
+    key.push_back(h.effect);
+    key.push_back(h.clock == Clock::kDay ? 1 : 0);
+    key.insert(key.end(), a.values.begin(), a.values.end());
+  }
+  struct Kept {
+    std::uint64_t predictor = 0;
+    std::vector<double> key;
+    std::shared_ptr<const Inputs> inputs;
+  };
+  thread_local std::vector<Kept> kept;
+  if (kept.size() <= index) kept.resize(index + 1);
+  Kept& k = kept[index];
+  if (k.inputs == nullptr || k.predictor != identity_ || k.key != key) {
+    k.inputs = make_inputs(model, index);
+    k.predictor = identity_;
+    k.key = std::move(key);
+  }
+  return k.inputs;
+}
+
+std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
+                                                                std::size_t index) const {
+  const PreparedRun& run = data_->runs[index];
+  auto shared = std::make_shared<Inputs>();
+  Inputs& in = *shared;
   in.angle = &run.angle;
   in.velocity = &run.velocity;
   in.acceleration = &run.acceleration;
@@ -134,7 +292,7 @@ Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRu
   in.slow_acceleration = &run.slow_acceleration;
   in.pressure[0] = &run.pressure[0];
   in.pressure[1] = &run.pressure[1];
-  if (run.angle.empty()) return in;
+  if (run.angle.empty()) return shared;
   const double dt = run.interval;
   double skew = 0;
   bool angle = false;
@@ -146,45 +304,11 @@ Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRu
       angle = angle || !is_null(a);
     }
   }
-  if (angle) {
-    // Undo the readings, the last first, by fixed-point iteration on the recorded samples.
-    std::vector<double> truth = run.raw_angle;
-    for (auto it = model.effects.rbegin(); it != model.effects.rend(); ++it) {
-      if (!it->hypothesis->reads_angle || it->hypothesis->info().hook == Hook::kDelay || is_null(*it)) continue;
-      const int e = it->hypothesis->effect;
-      const double* q = it->values.data();
-      const std::vector<double> read = truth;
-      for (int round = 0; round < (it->hypothesis->info().state_count > 0 ? 1 : kInversions); ++round) {
-        double z[models::kMaxEffectStates] = {};
-        models::Readings<double> y;
-        y.angle = read[0];
-        models::effect_reading_rest(e, q, y, z);
-        for (std::size_t k = 0; k < read.size(); ++k) {
-          y.angle = truth[k];
-          models::effect_reading_step(e, q, y, z);
-          const double in_angle = y.angle;
-          models::effect_reading(e, q, time_of(*it->hypothesis, run, k), z, y);
-          truth[k] = read[k] - (y.angle - in_angle);
-        }
-      }
-    }
-    const double sigma = data_->smoothing.torque / dt;
-    in.own_angle = low_pass(truth, sigma);
-    in.own_velocity = low_pass_derivative(truth, sigma, dt, 1);
-    in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
-    in.own_dry = run.dry_velocity;
-    in.angle = &in.own_angle;
-    in.velocity = &in.own_velocity;
-    in.acceleration = &in.own_acceleration;
-    if (run.is_free && !run.slow_acceleration.empty()) {
-      in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
-      in.slow_acceleration = &in.own_slow_acceleration;
-    }
-  }
+  if (angle) undo_angle_readings(model, run, in);
   if (skew != 0) {
     const double shift = skew / dt;
-    const std::vector<double> angle_at = *in.angle, velocity_at = *in.velocity, acceleration_at = *in.acceleration,
-                              dry_at = *in.dry;
+    const std::vector<double> angle_at = *in.angle, velocity_at = *in.velocity,
+                              acceleration_at = *in.acceleration, dry_at = *in.dry;
     in.own_angle.resize(angle_at.size());
     in.own_velocity.resize(angle_at.size());
     in.own_acceleration.resize(angle_at.size());
@@ -208,8 +332,8 @@ Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRu
       in.slow_acceleration = &in.own_slow_acceleration;
     }
   }
-  if (!run.has_pressure) return in;
   for (const Active& a : model.effects) {
+    if (!run.has_pressure) break;
     const auto& info = a.hypothesis->info();
     const bool reading = a.hypothesis->reads_pressure;
     if ((!reading && info.hook != Hook::kMusclePressure) || is_null(a)) continue;
@@ -224,7 +348,8 @@ Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRu
           models::Readings<double> y;
           y.pressure[0] = truth[0];
           y.pressure[1] = truth[1];
-          models::effect_reading(e, a.values.data(), time_of(*a.hypothesis, run, k), static_cast<const double*>(nullptr), y);
+          models::effect_reading(e, a.values.data(), time_of(*a.hypothesis, run, k),
+                                 static_cast<const double*>(nullptr), y);
           for (int i = 0; i < 2; ++i) truth[i] = p[i] - (y.pressure[i] - truth[i]);
         }
         p[0] = truth[0];
@@ -238,44 +363,34 @@ Predictor::Inputs Predictor::inputs_of(const ModelPoint& model, const PreparedRu
     in.pressure[0] = &in.own_pressure[0];
     in.pressure[1] = &in.own_pressure[1];
   }
-  return in;
+  add_columns(index, in);
+  return shared;
 }
 
-namespace {
-
-JointPoint<double> point_at(const RigFacts& rig, double stiffness, double pressure_gain,
-                            const std::vector<double>& angle, const std::vector<double>& velocity,
-                            const std::vector<double>& acceleration, const std::vector<double>* const (&pressure)[2],
-                            double time, std::size_t k) {
-  JointPoint<double> x;
-  x.angle = angle[k];
-  x.velocity = velocity[k];
-  x.acceleration = acceleration[k];
-  if (pressure[0] != nullptr && !pressure[0]->empty()) {
-    const double p1 = (*pressure[0])[k], p2 = (*pressure[1])[k];
-    x.delta_pressure = 0.5 * (p2 - p1);
-    x.mean_pressure = 0.5 * (p1 + p2);
+/// The terms of the baseline at the rows of the torque chain, one after another, for unit parameters.
+void Predictor::add_columns(std::size_t index, Inputs& in) const {
+  const double one = 1;
+  in.columns.clear();
+  for (std::size_t i = data_->run_begin[index]; i < data_->run_begin[index + 1]; ++i) {
+    if (data_->rows[i].chain != Chain::kTorque) continue;
+    const JointPoint<double> x = point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration,
+                                          in.pressure, 0, data_->rows[i].sample);
+    for (std::size_t j = 0; j < terms_.size(); ++j)
+      in.columns.push_back(term_sign_[j] * models::effect_torque(terms_[j], &one, x));
   }
-  x.time = time;
-  x.wheel_radius = std::isfinite(rig.wheel_radius) ? rig.wheel_radius : 1.0;
-  x.reference_pressure = rig.initial_pressure;
-  x.stiffness = stiffness;
-  x.pressure_gain = pressure_gain;
-  return x;
 }
-
-}  // namespace
 
 double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const {
-  const JointPoint<double> x = point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
+  const JointPoint<double> x =
+      point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
   double torque = 0;
   for (std::size_t j = 0; j < terms_.size(); ++j)
     torque += term_sign_[j] * models::effect_torque(terms_[j], &model.base[j], x);
   return torque;
 }
 
-std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
-                                                 bool motion) const {
+std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run,
+                                                 const Inputs& in, bool motion) const {
   const bool seed = data_->baseline.terms.empty();
   std::vector<double> sum;
   for (const Active& a : model.effects) {
@@ -290,11 +405,13 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
     const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
     const std::vector<double>& acceleration = motion ? *in.slow_acceleration : *in.acceleration;
     const auto at = [&](std::size_t k) {
-      return point_at(data_->rig, stiffness, gain, *in.angle, velocity, acceleration, in.pressure, time_of(h, run, k), k);
+      return point_at(data_->rig, stiffness, gain, *in.angle, velocity, acceleration, in.pressure,
+                      time_of(h, run, k), k);
     };
     JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {
-      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k));
+      for (std::size_t k = 0; k < sum.size(); ++k)
+        sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k));
       continue;
     }
     Memory memory(a);
@@ -309,27 +426,28 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
   return sum;
 }
 
-/// What sensors of the force make of a torque: added to `change`. F2 = F1 + T/r, F1 = F2 − T/r for effects without memory;
-/// half of the torque on either side of the common force for those with one.
-void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run, const std::vector<double>& torque,
-                            std::vector<double>& change) const {
+/// What sensors of the force make of a torque: added to `change`. The forces are half of the torque on either side of their
+/// measured sum, whose noise is not that of the torque; where a reading is clipped, what the other sensor leaves for it.
+void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
+                            const std::vector<double>& torque, std::vector<double>& change) const {
   if (run.force[0].empty()) return;
   const double r = data_->rig.wheel_radius;
   for (const Active& a : model.effects) {
     const Hypothesis& h = *a.hypothesis;
     if (!h.reads_force || is_null(a)) continue;
     double z[models::kMaxEffectStates] = {};
-    const bool memory = h.info().state_count > 0;
+    const bool memory = h.info().state_count > 0, clips = !h.amplitude[0];
     double last[2] = {0, 0};
     for (std::size_t k = 0; k < torque.size(); ++k) {
       models::Readings<double> y;
       const double load = (torque[k] + change[k]) / r;
-      if (memory) {
-        y.force[0] = -0.5 * load;
-        y.force[1] = 0.5 * load;
-      } else {
+      if (clips) {
         y.force[0] = run.force[1][k] - load;
         y.force[1] = run.force[0][k] + load;
+      } else {
+        const double common = memory ? 0.0 : 0.5 * (run.force[0][k] + run.force[1][k]);
+        y.force[0] = common - 0.5 * load;
+        y.force[1] = common + 0.5 * load;
       }
       const double before[2] = {y.force[0], y.force[1]};
       if (memory) {
@@ -360,7 +478,8 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
                              std::vector<double> (&p)[2]) const {
   const std::size_t n = run.time.size();
   const double dt = run.interval;
-  const double gain = model.base[static_cast<std::size_t>(gain_)], lag = model.base[static_cast<std::size_t>(lag_)];
+  const double gain = model.base[static_cast<std::size_t>(gain_)],
+               lag = model.base[static_cast<std::size_t>(lag_)];
   struct Placed {
     const Active* active;
     double z[models::kMaxEffectStates];
@@ -385,7 +504,8 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   };
   models::ValvePoint<double> x;
   x.lag = lag;
-  const auto rates = [&](const double (&u0)[2], const double (&state)[2], double velocity, double (&v)[2], bool move_states) {
+  const auto rates = [&](const double(&u0)[2], const double(&state)[2], double velocity, double(&v)[2],
+                         bool move_states) {
     double u[2] = {gain * u0[0], gain * u0[1]};
     x.pressure[0] = state[0];
     x.pressure[1] = state[1];
@@ -474,7 +594,8 @@ void read_pressures(const ModelPoint& model, const PreparedRun& run, std::vector
       models::Readings<double> y;
       y.pressure[0] = p[0][k];
       y.pressure[1] = p[1][k];
-      models::effect_reading(h.effect, a.values.data(), time_of(h, run, k), static_cast<const double*>(nullptr), y);
+      models::effect_reading(h.effect, a.values.data(), time_of(h, run, k),
+                             static_cast<const double*>(nullptr), y);
       p[0][k] = y.pressure[0];
       p[1][k] = y.pressure[1];
     }
@@ -485,7 +606,7 @@ void read_pressures(const ModelPoint& model, const PreparedRun& run, std::vector
 class Kernel {
  public:
   explicit Kernel(double sigma) {
-    std::vector<double> impulse(static_cast<std::size_t>(2 * std::ceil(4 * sigma) + 1) + 2, 0.0);
+    std::vector<double> impulse(static_cast<std::size_t>(2 * std::ceil(6 * sigma) + 1) + 2, 0.0);
     impulse[impulse.size() / 2] = 1;
     weights_ = low_pass(impulse, sigma);
   }
@@ -500,7 +621,8 @@ class Kernel {
       return sum;
     }
     for (std::ptrdiff_t i = -reach; i <= reach; ++i)
-      sum += weights_[static_cast<std::size_t>(i + reach)] * x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at + i, 0, n - 1))];
+      sum += weights_[static_cast<std::size_t>(i + reach)] *
+             x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at + i, 0, n - 1))];
     return sum;
   }
 
@@ -509,18 +631,19 @@ class Kernel {
 };
 
 bool reads_force(const ModelPoint& model) {
-  return std::any_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
-    return a.hypothesis->reads_force && !is_null(a);
-  });
+  return std::any_of(model.effects.begin(), model.effects.end(),
+                     [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
 }
 
 }  // namespace
 
-void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned chains, Eigen::VectorXd& out) const {
+void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned chains,
+                            Eigen::VectorXd& out) const {
   const PreparedRun& run = data_->runs[index];
   const std::size_t begin = data_->run_begin[index], end = data_->run_begin[index + 1];
   if (begin == end) return;
-  const Inputs in = inputs_of(model, run);
+  const std::shared_ptr<const Inputs> kept = inputs_of(model, index);
+  const Inputs& in = *kept;
   const auto for_rows = [&](Chain chain, auto&& value) {
     for (std::size_t i = begin; i < end; ++i)
       if (data_->rows[i].chain == chain) out[static_cast<Eigen::Index>(i)] = value(data_->rows[i].sample);
@@ -539,11 +662,18 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
         for (std::size_t k = 0; k < change.size(); ++k) extra[k] += change[k];
       }
     }
+    const double* column = in.columns.data();
+    const double resting = model.rest.empty() ? 0.0 : model.rest[index] * stiffness(model);
+    const auto base = [&] {
+      double sum = resting;
+      for (std::size_t j = 0; j < terms_.size(); ++j) sum += model.base[j] * *column++;
+      return sum;
+    };
     if (extra.empty()) {
-      for_rows(Chain::kTorque, [&](std::size_t k) { return base_torque(model, in, k); });
+      for_rows(Chain::kTorque, [&](std::size_t) { return base(); });
     } else {
       const Kernel kernel(data_->smoothing.torque / run.interval);
-      for_rows(Chain::kTorque, [&](std::size_t k) { return base_torque(model, in, k) + kernel(extra, k); });
+      for_rows(Chain::kTorque, [&](std::size_t k) { return base() + kernel(extra, k); });
     }
   }
   if ((chains & bit(Chain::kMotion)) != 0 && run.is_free && !run.slow_acceleration.empty()) {
@@ -577,6 +707,12 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
   }
 }
 
+double Predictor::stiffness(const ModelPoint& model) const noexcept {
+  if (stiffness_ < 0) return 0;
+  const double r = data_->rig.wheel_radius;
+  return model.base[static_cast<std::size_t>(stiffness_)] * r * r;
+}
+
 void Predictor::predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const {
   for (std::size_t r = 0; r < data_->runs.size(); ++r) predict_run(model, r, chains, out);
 }
@@ -584,13 +720,15 @@ void Predictor::predict(const ModelPoint& model, unsigned chains, Eigen::VectorX
 Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t index) const {
   const PreparedRun& run = data_->runs[index];
   FullRate rate;
-  const Inputs in = inputs_of(model, run);
+  const std::shared_ptr<const Inputs> kept = inputs_of(model, index);
+  const Inputs& in = *kept;
   const bool reads = reads_force(model);
   if (run.has_torque && (run.has_pressure || !data_->baseline.terms.empty())) {
     const std::vector<double> extra = torque_of_effects(model, run, in, false);
     rate.torque.resize(run.time.size());
+    const double resting = index < model.rest.size() ? model.rest[index] * stiffness(model) : 0.0;
     for (std::size_t k = 0; k < rate.torque.size(); ++k)
-      rate.torque[k] = base_torque(model, in, k) + (extra.empty() ? 0.0 : extra[k]);
+      rate.torque[k] = resting + base_torque(model, in, k) + (extra.empty() ? 0.0 : extra[k]);
     if (reads) {
       std::vector<double> change(rate.torque.size(), 0.0);
       read_forces(model, run, rate.torque, change);

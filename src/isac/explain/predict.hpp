@@ -14,6 +14,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -33,6 +35,8 @@ struct BaseParameter {
 struct ModelPoint {
   std::vector<double> base;
   std::vector<Active> effects;  ///< tolerances among them
+  /// Of each run in which the joint rests: where between two steps of the encoder it stands, rad. Empty: none.
+  std::vector<double> rest;
 };
 
 class Predictor {
@@ -42,6 +46,10 @@ class Predictor {
   [[nodiscard]] const std::vector<BaseParameter>& base() const noexcept { return base_; }
   [[nodiscard]] const Prepared& data() const noexcept { return *data_; }
   [[nodiscard]] std::size_t rows() const noexcept { return data_->rows.size(); }
+  /// Runs whose angle stays within two steps of the encoder.
+  [[nodiscard]] const std::vector<std::size_t>& resting_runs() const noexcept { return resting_; }
+  /// Torque per radian of the baseline: what an angle within a step is worth.
+  [[nodiscard]] double stiffness(const ModelPoint& model) const noexcept;
   /// What was measured, low-passed: the residual's other half.
   [[nodiscard]] const Eigen::VectorXd& measured() const noexcept { return measured_; }
   /// Predictions of the rows of one run that belong to the chains asked for; other rows of `out` stay as they are.
@@ -55,7 +63,10 @@ class Predictor {
 
  private:
   struct Inputs;
-  Inputs inputs_of(const ModelPoint& model, const PreparedRun& run) const;
+  std::shared_ptr<const Inputs> inputs_of(const ModelPoint& model, std::size_t run) const;
+  std::shared_ptr<const Inputs> make_inputs(const ModelPoint& model, std::size_t run) const;
+  void undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const;
+  void add_columns(std::size_t run, Inputs& in) const;
   std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                                         bool motion) const;
   double base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const;
@@ -65,12 +76,14 @@ class Predictor {
                    std::vector<double>& change) const;
 
   const Prepared* data_;
+  std::uint64_t identity_ = 0;  ///< of this predictor among all, for what a thread keeps
   std::vector<BaseParameter> base_;
   std::vector<int> terms_;         ///< catalogue indices of the output's terms
   std::vector<double> term_sign_;  ///< −1 for a driven axis
   int gain_ = -1, lag_ = -1;       ///< positions of K_C, T_C in base
   int stiffness_ = -1, pressure_gain_ = -1;
   Eigen::VectorXd measured_;
+  std::vector<std::size_t> resting_;
 };
 
 }  // namespace isac::explain

@@ -10,21 +10,25 @@
 #include "isac/core/units.hpp"
 #include "isac/series/derive.hpp"
 #include "isac/series/differentiate.hpp"
+#include "isac/series/statistics.hpp"
 
 namespace isac::explain {
 namespace {
 
-constexpr double kKernelReach = 4.0;      // standard deviations
-constexpr double kRowRate = 125;          // Hz: beyond it the kernel has left nothing
-constexpr double kSlowestStep = 0.05;     // s per encoder step: slower is standing still
-constexpr double kWideKernel = 0.020;     // s, for velocities that the encoder resolves badly
+constexpr double kKernelReach =
+    6.0;                          // standard deviations: what is cut off the second derivative is below 1e-6
+constexpr double kRowRate = 125;  // Hz: beyond it the kernel has left nothing
+constexpr double kSlowestStep = 0.05;      // s per encoder step: slower is standing still
+constexpr double kWideKernel = 0.020;      // s, for velocities that the encoder resolves badly
+constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
 constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
 
 std::vector<double> gaussian(double sigma, int order) {
   const int reach = std::max(1, static_cast<int>(std::ceil(kKernelReach * sigma)));
   std::vector<double> g(static_cast<std::size_t>(2 * reach + 1));
   double sum = 0;
-  for (int k = -reach; k <= reach; ++k) sum += g[static_cast<std::size_t>(k + reach)] = std::exp(-0.5 * k * k / (sigma * sigma));
+  for (int k = -reach; k <= reach; ++k)
+    sum += g[static_cast<std::size_t>(k + reach)] = std::exp(-0.5 * k * k / (sigma * sigma));
   for (double& v : g) v /= sum;
   if (order == 0) return g;
   // Derivatives that are exact on the polynomials they must be exact on, whatever the truncation.
@@ -86,8 +90,8 @@ const std::vector<double>* values_of(const series::Recording& run, const char* n
   return column == nullptr ? nullptr : &column->values;
 }
 
-PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig, const BaselineModel& baseline,
-                        const Smoothing& smoothing) {
+PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
+                        const BaselineModel& baseline, const Smoothing& smoothing) {
   PreparedRun run;
   run.name = recording.source.substr(recording.source.find_last_of('/') + 1);
   run.sha256 = recording.sha256;
@@ -126,8 +130,14 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   std::vector<double> p1 = take("p1"), p2 = take("p2");
   if (!p1.empty() && !p2.empty()) {
     run.has_pressure = true;
-    run.pressure[0] = low_pass(p1, sigma);
-    run.pressure[1] = low_pass(p2, sigma);
+    run.raw_pressure[0] = std::move(p1);
+    run.raw_pressure[1] = std::move(p2);
+    for (int i = 0; i < 2; ++i) {
+      const std::vector<double>* raw[] = {&run.raw_pressure[i]};
+      run.smooth_pressure[i] = low_pass(run.raw_pressure[i], sigma);
+      run.pressure[i] =
+          quieten(run.raw_pressure[i], run.smooth_pressure[i], sigma, kRestingKernel / dt, white_noise(raw));
+    }
   }
   run.command[0] = take("p1_cmd");
   run.command[1] = take("p2_cmd");
@@ -168,6 +178,15 @@ void add_rows(Prepared& data) {
   data.rows.clear();
   data.run_begin.assign(1, 0);
   const bool seed = data.baseline.terms.empty();
+  // A free joint moves by its own noise: the torque's disturbance stands in the angle too, and a fit of one by the other
+  // is biased. Where hand-driven and clamped runs suffice, free runs speak by their balance of motion only.
+  double driven = 0, all = 0;
+  for (const PreparedRun& run : data.runs) {
+    if (!run.has_torque || run.time.empty() || !run.has_pressure) continue;
+    all += run.time.back();
+    if (!run.is_free) driven += run.time.back();
+  }
+  const bool driven_enough = seed && driven >= 0.4 * all;
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const PreparedRun& run = data.runs[r];
     const auto stride = static_cast<std::size_t>(data.stride);
@@ -175,9 +194,13 @@ void add_rows(Prepared& data) {
       if (!there) return;
       for (std::size_t k = 0; k < run.time.size(); k += step)
         if (run.usable[k] != 0 && run.time[k] >= skip)
-          data.rows.push_back({.run = static_cast<unsigned>(r), .sample = static_cast<unsigned>(k), .block = 0, .chain = chain});
+          data.rows.push_back({.run = static_cast<unsigned>(r),
+                               .sample = static_cast<unsigned>(k),
+                               .block = 0,
+                               .chain = chain});
     };
-    put(Chain::kTorque, run.has_torque && (!seed || run.has_pressure), 0, stride);
+    put(Chain::kTorque, run.has_torque && (!seed || run.has_pressure) && (!run.is_free || !driven_enough), 0,
+        stride);
     put(Chain::kPressure1, seed && run.has_command, kPressureSettling, 2 * stride);
     put(Chain::kPressure2, seed && run.has_command, kPressureSettling, 2 * stride);
     put(Chain::kMotion, seed && run.is_free && run.has_torque && std::isfinite(data.rig.inertia), 0, stride);
@@ -205,11 +228,42 @@ std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_
       for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
     } else {
       for (std::ptrdiff_t k = -reach; k <= reach; ++k)
-        sum += g[static_cast<std::size_t>(k + reach)] * x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
+        sum += g[static_cast<std::size_t>(k + reach)] *
+               x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
     }
     out.push_back(sum);
   }
   return out;
+}
+
+std::vector<double> quieten(std::span<const double> raw, std::span<const double> narrow, double sigma,
+                            double wide_sigma, double white) {
+  const std::vector<double> wide = low_pass(raw, wide_sigma);
+  std::vector<double> difference(raw.size());
+  for (std::size_t k = 0; k < raw.size(); ++k) difference[k] = (narrow[k] - wide[k]) * (narrow[k] - wide[k]);
+  const std::vector<double> power = low_pass(difference, 2 * wide_sigma);
+  // White noise of variance s² has s²/(2 √π σ) of it left after a Gaussian of σ samples.
+  const double expected = white * white / (2 * std::sqrt(kPi) * sigma);
+  std::vector<double> out(raw.size());
+  for (std::size_t k = 0; k < raw.size(); ++k) {
+    const double share = expected > 0 ? std::clamp((power[k] / expected - 1.5) / 1.5, 0.0, 1.0) : 1.0;
+    out[k] = wide[k] + share * (narrow[k] - wide[k]);
+  }
+  return out;
+}
+
+double white_noise(std::span<const std::vector<double>* const> signals) {
+  std::vector<double> d;
+  for (const std::vector<double>* x : signals)
+    for (std::size_t k = 2; k + 2 < x->size(); k += 3) {
+      const double v = (*x)[k - 2] - 4 * (*x)[k - 1] + 6 * (*x)[k] - 4 * (*x)[k + 1] + (*x)[k + 2];
+      if (std::isfinite(v)) d.push_back(v);
+    }
+  double squares = 0;
+  for (const double v : d) squares += v * v;
+  // A quantised signal at rest has a median of nothing: never below a quarter of the plain deviation.
+  const double plain = d.empty() ? 0 : std::sqrt(squares / static_cast<double>(d.size()));
+  return std::max(series::robust_deviation(d, true), 0.25 * plain) / std::sqrt(70.0);
 }
 
 std::vector<double> low_pass_derivative(std::span<const double> x, double sigma, double interval, int order) {
@@ -225,20 +279,22 @@ std::vector<double> low_pass_derivative(std::span<const double> x, double sigma,
       for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
     } else {
       for (std::ptrdiff_t k = -reach; k <= reach; ++k)
-        sum += g[static_cast<std::size_t>(k + reach)] * x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
+        sum += g[static_cast<std::size_t>(k + reach)] *
+               x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
     }
     out[static_cast<std::size_t>(i)] = sum * scale;
   }
   return out;
 }
 
-std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity, double interval,
-                                 double angle_step) {
+std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity,
+                                 double interval, double angle_step) {
   const std::vector<double> wide = low_pass_derivative(raw_angle, kWideKernel / interval, interval, 1);
   const double still = std::isfinite(angle_step) && angle_step > 0 ? angle_step / kSlowestStep : 0.0;
   std::vector<double> out(velocity.size());
   for (std::size_t k = 0; k < out.size(); ++k) {
-    const double share = still > 0 ? std::clamp((std::abs(wide[k]) - 2 * still) / (4 * still), 0.0, 1.0) : 1.0;
+    const double share =
+        still > 0 ? std::clamp((std::abs(wide[k]) - 2 * still) / (4 * still), 0.0, 1.0) : 1.0;
     const double w = share * velocity[k] + (1 - share) * wide[k];
     out[k] = std::abs(w) > still ? w : 0.0;
   }
@@ -250,7 +306,8 @@ void cut_blocks(Prepared& data, double block_seconds) {
   std::size_t block = 0;
   for (std::size_t r = 0; r + 1 < data.run_begin.size(); ++r) {
     const double duration = data.runs[r].time.empty() ? 0 : data.runs[r].time.back();
-    const auto count = std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(duration / block_seconds)));
+    const auto count =
+        std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(duration / block_seconds)));
     for (std::size_t i = data.run_begin[r]; i < data.run_begin[r + 1]; ++i) {
       const double share = duration > 0 ? data.runs[r].time[data.rows[i].sample] / duration : 0;
       data.rows[i].block = static_cast<unsigned>(
@@ -262,7 +319,7 @@ void cut_blocks(Prepared& data, double block_seconds) {
 }
 
 Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig, const BaselineModel& baseline,
-                 double block_seconds) {
+                 double block_seconds, double first_start) {
   Prepared data;
   data.rig = rig;
   data.baseline = baseline;
@@ -276,14 +333,17 @@ Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig, c
   double first = std::numeric_limits<double>::infinity();
   for (const double t : started)
     if (std::isfinite(t)) first = std::min(first, t);
+  if (std::isfinite(first_start)) first = first_start;
+  if (std::isfinite(first)) data.first_start = first;
   for (std::size_t r = 0; r < data.runs.size(); ++r)
-    data.runs[r].day_offset = std::isfinite(started[r]) ? started[r] - first : 0;
+    data.runs[r].day_offset = std::isfinite(started[r]) && std::isfinite(first) ? started[r] - first : 0;
   data.stride = std::max(1, static_cast<int>(std::floor(rate / kRowRate + 1e-6)));
   add_rows(data);
   if (data.rows.empty()) {
-    throw Error(ErrorKind::kAnswerIsNo, "no_usable_data",
-                "no run has what a comparison needs: angle with F1 and F2 (or torque) and p1, p2, or p1_cmd, p2_cmd "
-                "with p1, p2; record them with isac-log.");
+    throw Error(
+        ErrorKind::kAnswerIsNo, "no_usable_data",
+        "no run has what a comparison needs: angle with F1 and F2 (or torque) and p1, p2, or p1_cmd, p2_cmd "
+        "with p1, p2; record them with isac-log.");
   }
   cut_blocks(data, block_seconds);
   return data;

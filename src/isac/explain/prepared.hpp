@@ -22,12 +22,12 @@ namespace isac::explain {
 
 /// What is known of the rig beforehand; NaN where not.
 struct RigFacts {
-  double wheel_radius = std::numeric_limits<double>::quiet_NaN();  ///< m
-  double initial_pressure = 3.0 * 98066.5;                         ///< Pa, p0
-  double inertia = std::numeric_limits<double>::quiet_NaN();       ///< kg m²
-  double angle_step = std::numeric_limits<double>::quiet_NaN();    ///< rad of the encoder
-  double force_lag = std::numeric_limits<double>::quiet_NaN();     ///< s, of the force amplifiers
-  double force_noise = std::numeric_limits<double>::quiet_NaN();   ///< N, data sheet
+  double wheel_radius = std::numeric_limits<double>::quiet_NaN();    ///< m
+  double initial_pressure = 3.0 * 98066.5;                           ///< Pa, p0
+  double inertia = std::numeric_limits<double>::quiet_NaN();         ///< kg m²
+  double angle_step = std::numeric_limits<double>::quiet_NaN();      ///< rad of the encoder
+  double force_lag = std::numeric_limits<double>::quiet_NaN();       ///< s, of the force amplifiers
+  double force_noise = std::numeric_limits<double>::quiet_NaN();     ///< N, data sheet
   double pressure_noise = std::numeric_limits<double>::quiet_NaN();  ///< Pa, data sheet
 };
 
@@ -48,17 +48,20 @@ struct PreparedRun {
   double interval = 0;    ///< s
   double day_offset = 0;  ///< s from the first run's start to this one's
   bool has_torque = false, has_pressure = false, has_command = false, is_free = false;
-  std::vector<double> time;             ///< s
-  std::vector<double> raw_angle;        ///< rad as read
+  std::vector<double> time;                           ///< s
+  std::vector<double> raw_angle;                      ///< rad as read
   std::vector<double> angle, velocity, acceleration;  ///< low-passed
-  std::vector<double> dry_velocity;     ///< velocity that an encoder can tell from standing still
-  std::vector<double> pressure[2];      ///< Pa, low-passed
-  std::vector<double> command[2];       ///< Pa as recorded
-  std::vector<double> force[2];         ///< N as read; empty where only the torque is known
-  std::vector<double> torque;           ///< N m (or the output's unit) as read
-  std::vector<double> smooth_torque;    ///< low-passed for the torque chain
+  std::vector<double> dry_velocity;        ///< velocity that an encoder can tell from standing still
+  std::vector<double> raw_pressure[2];     ///< Pa as read
+  std::vector<double> smooth_pressure[2];  ///< Pa, low-passed: what the valve unit's model is held against
+  /// Pa, what enters the torque: low-passed more where the pressure rests, so that its noise does not pass for torque.
+  std::vector<double> pressure[2];
+  std::vector<double> command[2];                      ///< Pa as recorded
+  std::vector<double> force[2];                        ///< N as read; empty where only the torque is known
+  std::vector<double> torque;                          ///< N m (or the output's unit) as read
+  std::vector<double> smooth_torque;                   ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
-  std::vector<unsigned char> usable;    ///< 0 beside gaps and edges
+  std::vector<unsigned char> usable;                   ///< 0 beside gaps and edges
 };
 
 /// One row of the stacked residual.
@@ -76,11 +79,13 @@ struct Prepared {
   BaselineModel baseline;
   Smoothing smoothing;
   std::vector<PreparedRun> runs;
-  std::vector<Row> rows;        ///< by run, then by chain, then by time
+  std::vector<Row> rows;               ///< by run, then by chain, then by time
   std::vector<std::size_t> run_begin;  ///< rows of run i: [run_begin[i], run_begin[i + 1])
   std::size_t blocks = 0;
   double block_seconds = 0;
-  int stride = 1;  ///< samples per row
+  double first_start =
+      std::numeric_limits<double>::quiet_NaN();  ///< s since 1970 of the day's first run, where known
+  int stride = 1;                                ///< samples per row
 
   [[nodiscard]] bool has(Chain chain) const noexcept;
 };
@@ -98,18 +103,27 @@ class HeldOut {
 };
 
 [[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
-                               const BaselineModel& baseline, double block_seconds);
+                               const BaselineModel& baseline, double block_seconds,
+                               double first_start = std::numeric_limits<double>::quiet_NaN());
 /// Cuts the rows into blocks anew.
 void cut_blocks(Prepared& data, double block_seconds);
 
+/// A signal low-passed widely where what is lost is noise, narrowly where it moves.
+[[nodiscard]] std::vector<double> quieten(std::span<const double> raw, std::span<const double> narrow,
+                                          double sigma_samples, double wide_sigma_samples,
+                                          double white_noise);
+/// Standard deviation of white noise of one sample, from differences that a smooth signal does not pass.
+[[nodiscard]] double white_noise(std::span<const std::vector<double>* const> signals);
+
 /// g ∗ x at the samples asked for (every `stride`-th from `first`); the ends are continued by their last value.
-[[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples, std::size_t first = 0,
-                                           std::size_t stride = 1);
+[[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples,
+                                           std::size_t first = 0, std::size_t stride = 1);
 /// (g′ ∗ x)/Δt and (g″ ∗ x)/Δt².
 [[nodiscard]] std::vector<double> low_pass_derivative(std::span<const double> x, double sigma_samples,
                                                       double interval, int order);
 /// Velocity that can be told from standing still; see the head of this file.
-[[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity,
-                                               double interval, double angle_step);
+[[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle,
+                                               std::span<const double> velocity, double interval,
+                                               double angle_step);
 
 }  // namespace isac::explain

@@ -13,10 +13,14 @@ constexpr double kSkipStart = 0.4;  // s in which a simulated pressure still fee
 
 const std::vector<double>& predicted(const Predictor::FullRate& rate, Chain chain) {
   switch (chain) {
-    case Chain::kTorque: return rate.torque;
-    case Chain::kMotion: return rate.motion;
-    case Chain::kPressure1: return rate.pressure[0];
-    case Chain::kPressure2: return rate.pressure[1];
+    case Chain::kTorque:
+      return rate.torque;
+    case Chain::kMotion:
+      return rate.motion;
+    case Chain::kPressure1:
+      return rate.pressure[0];
+    case Chain::kPressure2:
+      return rate.pressure[1];
   }
   return rate.torque;
 }
@@ -25,9 +29,12 @@ const std::vector<double>& predicted(const Predictor::FullRate& rate, Chain chai
 const std::vector<double>& read_signal(const PreparedRun& run, Chain chain) {
   switch (chain) {
     case Chain::kTorque:
-    case Chain::kMotion: return run.torque;
-    case Chain::kPressure1: return run.pressure[0];
-    case Chain::kPressure2: return run.pressure[1];
+    case Chain::kMotion:
+      return run.torque;
+    case Chain::kPressure1:
+      return run.raw_pressure[0];
+    case Chain::kPressure2:
+      return run.raw_pressure[1];
   }
   return run.torque;
 }
@@ -41,10 +48,14 @@ struct Label {
 Label label_of(const Predictor& predictor, Chain chain) {
   static constexpr double kPerBar = 1.0 / kPascalPerKgfCm2;
   switch (chain) {
-    case Chain::kTorque: break;
-    case Chain::kMotion: return {"motion", "N m", 1};
-    case Chain::kPressure1: return {"p1", "kg/cm2", kPerBar};
-    case Chain::kPressure2: return {"p2", "kg/cm2", kPerBar};
+    case Chain::kTorque:
+      break;
+    case Chain::kMotion:
+      return {"motion", "N m", 1};
+    case Chain::kPressure1:
+      return {"p1", "kg/cm2", kPerBar};
+    case Chain::kPressure2:
+      return {"p2", "kg/cm2", kPerBar};
   }
   const BaselineModel& baseline = predictor.data().baseline;
   return {baseline.output.c_str(), baseline.output_unit.c_str(), 1};
@@ -52,8 +63,12 @@ Label label_of(const Predictor& predictor, Chain chain) {
 
 }  // namespace
 
-double Sums::rms() const { return samples > 0 ? std::sqrt(squares / static_cast<double>(samples)) : kNotKnown; }
-double Sums::signal_rms() const { return samples > 0 ? std::sqrt(signal_squares / static_cast<double>(samples)) : kNotKnown; }
+double Sums::rms() const {
+  return samples > 0 ? std::sqrt(squares / static_cast<double>(samples)) : kNotKnown;
+}
+double Sums::signal_rms() const {
+  return samples > 0 ? std::sqrt(signal_squares / static_cast<double>(samples)) : kNotKnown;
+}
 
 Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain chain) {
   Sums sums;
@@ -74,14 +89,15 @@ Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain cha
   return sums;
 }
 
-std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before, const ModelPoint& after, Chain chain,
-                                bool heldout, std::size_t most_points) {
+std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before, const ModelPoint& after,
+                                Chain chain, bool heldout, std::size_t most_points) {
   std::vector<RunTrace> traces;
   const Label label = label_of(predictor, chain);
   for (std::size_t r = 0; r < predictor.data().runs.size(); ++r) {
     const PreparedRun& run = predictor.data().runs[r];
     if (predictor.data().run_begin[r] == predictor.data().run_begin[r + 1]) continue;
-    const Predictor::FullRate old_rate = predictor.full_rate(before, r), new_rate = predictor.full_rate(after, r);
+    const Predictor::FullRate old_rate = predictor.full_rate(before, r),
+                              new_rate = predictor.full_rate(after, r);
     const std::vector<double>&y0 = predicted(old_rate, chain), &y1 = predicted(new_rate, chain);
     if (y0.empty()) continue;
     RunTrace t;
@@ -89,9 +105,10 @@ std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& be
     t.signal = label.signal;
     t.unit = label.unit;
     t.heldout = heldout;
-    const std::vector<double>& measured = chain == Chain::kTorque ? run.smooth_torque
-                                          : chain == Chain::kMotion ? run.slow_torque
-                                                                    : read_signal(run, chain);
+    const std::vector<double>& measured = chain == Chain::kTorque      ? run.smooth_torque
+                                          : chain == Chain::kMotion    ? run.slow_torque
+                                          : chain == Chain::kPressure1 ? run.smooth_pressure[0]
+                                                                       : run.smooth_pressure[1];
     const std::size_t step = std::max<std::size_t>(1, y0.size() / most_points);
     for (std::size_t k = 0; k < y0.size(); k += step) {
       if (run.usable[k] == 0) continue;
@@ -116,12 +133,14 @@ std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& be
 Proof::Proof(const HeldOut& heldout, const Prepared& fitted) {
   if (heldout.size() == 0) return;
   try {
-    data_.emplace(prepare(heldout.runs_, fitted.rig, fitted.baseline, std::max(1.0, fitted.block_seconds)));
+    data_.emplace(prepare(heldout.runs_, fitted.rig, fitted.baseline, std::max(1.0, fitted.block_seconds),
+                          fitted.first_start));
   } catch (const Error&) {
     return;  // nothing in them can be compared
   }
   predictor_.emplace(*data_);
-  for (std::size_t r = 0; r + 1 < data_->run_begin.size(); ++r) count_ += data_->run_begin[r] < data_->run_begin[r + 1] ? 1U : 0U;
+  for (std::size_t r = 0; r + 1 < data_->run_begin.size(); ++r)
+    count_ += data_->run_begin[r] < data_->run_begin[r + 1] ? 1U : 0U;
 }
 
 Sums Proof::residual(const ModelPoint& model, Chain chain) const {
@@ -131,7 +150,8 @@ Sums Proof::residual(const ModelPoint& model, Chain chain) const {
   return raw_residual(*predictor_, here, chain);
 }
 
-std::vector<RunTrace> Proof::traces(const ModelPoint& before, const ModelPoint& after, Chain chain, std::size_t most_points) const {
+std::vector<RunTrace> Proof::traces(const ModelPoint& before, const ModelPoint& after, Chain chain,
+                                    std::size_t most_points) const {
   if (!predictor_) return {};
   ModelPoint b = before, a = after;
   b.base.resize(predictor_->base().size());

@@ -28,8 +28,9 @@ struct Sums {
 [[nodiscard]] Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain chain);
 
 /// Columns for the pictures.
-[[nodiscard]] std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before, const ModelPoint& after,
-                                              Chain chain, bool heldout, std::size_t most_points);
+[[nodiscard]] std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before,
+                                              const ModelPoint& after, Chain chain, bool heldout,
+                                              std::size_t most_points);
 
 class Proof {
  public:

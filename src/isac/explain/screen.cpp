@@ -12,13 +12,18 @@
 namespace isac::explain {
 namespace {
 
-double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+constexpr double kCarryingBlocks = 8;
+
+double upper_tail(double z) {
+  return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
   std::vector<std::size_t> amplitudes;
   for (int i = 0; i < h.info().parameter_count; ++i)
-    if (h.amplitude[static_cast<std::size_t>(i)] && h.free[static_cast<std::size_t>(i)]) amplitudes.push_back(static_cast<std::size_t>(i));
+    if (h.amplitude[static_cast<std::size_t>(i)] && h.free[static_cast<std::size_t>(i)])
+      amplitudes.push_back(static_cast<std::size_t>(i));
   if (amplitudes.size() < 2) return {shape};
   std::vector<Values> all;
   for (const std::size_t keep : amplitudes) {
@@ -35,7 +40,8 @@ struct SignedFit {
   Eigen::VectorXd amplitude;
 };
 
-SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score, const std::vector<bool>& positive_only) {
+SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
+                     const std::vector<bool>& positive_only) {
   const int n = static_cast<int>(score.size());
   SignedFit best;
   best.amplitude = Eigen::VectorXd::Zero(n);
@@ -49,7 +55,8 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score, 
     Eigen::VectorXd s(k);
     for (Eigen::Index i = 0; i < k; ++i) {
       s[i] = score[use[static_cast<std::size_t>(i)]];
-      for (Eigen::Index j = 0; j < k; ++j) g(i, j) = gram(use[static_cast<std::size_t>(i)], use[static_cast<std::size_t>(j)]);
+      for (Eigen::Index j = 0; j < k; ++j)
+        g(i, j) = gram(use[static_cast<std::size_t>(i)], use[static_cast<std::size_t>(j)]);
       g(i, i) *= 1 + 1e-6;
     }
     const Eigen::VectorXd a = g.ldlt().solve(s);
@@ -97,7 +104,7 @@ Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
   return q;
 }
 
-double flip_p_value(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double* statistic) {
+FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double significance) {
   const Eigen::Index blocks = scores.rows(), columns = scores.cols();
   Eigen::MatrixXd scaled = scores;
   for (Eigen::Index j = 0; j < columns; ++j) {
@@ -105,7 +112,8 @@ double flip_p_value(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed
     if (norm > 0) scaled.col(j) /= norm;
   }
   const double observed = columns > 0 ? scaled.colwise().sum().cwiseAbs().maxCoeff() : 0.0;
-  if (statistic != nullptr) *statistic = observed;
+  std::vector<double> all;
+  all.reserve(static_cast<std::size_t>(flips));
   std::mt19937_64 random(seed);
   int reached = 1;
   constexpr Eigen::Index kAtOnce = 128;
@@ -115,32 +123,36 @@ double flip_p_value(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed
     for (Eigen::Index i = 0; i < now; ++i)
       for (Eigen::Index b = 0; b < blocks; b += 64) {
         std::uint64_t bits = random();
-        for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1) signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
+        for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1)
+          signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
       }
     const Eigen::VectorXd largest = (signs * scaled).cwiseAbs().rowwise().maxCoeff();
+    all.insert(all.end(), largest.data(), largest.data() + largest.size());
     reached += static_cast<int>((largest.array() >= observed * (1 - 1e-12)).count());
   }
-  return static_cast<double>(reached) / static_cast<double>(flips + 1);
+  FlipTest test;
+  test.statistic = observed;
+  test.p_value = static_cast<double>(reached) / static_cast<double>(flips + 1);
+  test.limit = series::quantile(all, 1 - significance);
+  return test;
 }
 
-Screen screen(const Predictor& predictor, const Fit& fit, const Library& library, const Weights& weights,
-              const ScreenOptions& options) {
+Screen screen(const Around& place, const Library& library, const ScreenOptions& options) {
+  const Predictor& predictor = *place.predictor;
   const Prepared& data = predictor.data();
   const auto n = static_cast<Eigen::Index>(predictor.rows());
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
-  const Eigen::MatrixXd q = basis_of(sensitivities(predictor, fit, weights));
-  Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
-  predictor.predict(fit.model, kAllChains, here);
-  const Eigen::VectorXd residual = fit.residual - q * (q.transpose() * fit.residual);
+  const Eigen::VectorXd& residual = place.residual;
 
   const auto summarise = [&](Eigen::VectorXd& x, Column& column) {
     column.raw_norm2 = x.squaredNorm();
-    x -= q * (q.transpose() * x);
+    x = place.project(x);
     column.block_score = Eigen::VectorXd::Zero(blocks);
     column.block_norm = Eigen::VectorXd::Zero(blocks);
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].block);
-      column.block_score[b] -= x[i] * residual[i];  // prediction − measured: an effect that is missing has the other sign
+      column.block_score[b] -=
+          x[i] * residual[i];  // prediction − measured: an effect that is missing has the other sign
       column.block_norm[b] += x[i] * x[i];
     }
     column.norm2 = column.block_norm.sum();
@@ -154,13 +166,38 @@ Screen screen(const Predictor& predictor, const Fit& fit, const Library& library
   };
 
   std::vector<Task> tasks;
+  // What a tolerance takes up within its bounds is no finding. (Nor could it be tested: the response to a shift of the angle
+  // contains the encoder's noise twice.)
+  const auto taken_up = [&](const Hypothesis& h) {
+    for (std::size_t i = 0; i < place.fit->tolerances; ++i) {
+      const Active& a = place.fit->model.effects[i];
+      if (a.hypothesis->effect != h.effect) continue;
+      const double margin = 0.01 * (a.hypothesis->upper[0] - a.hypothesis->lower[0]);
+      return a.values[0] > a.hypothesis->lower[0] + margin && a.values[0] < a.hypothesis->upper[0] - margin;
+    }
+    return false;
+  };
   for (std::size_t h = 0; h < library.hypotheses.size(); ++h)
-    for (std::size_t s = 0; s < library.hypotheses[h].shapes.size(); ++s)
+    for (std::size_t s = 0; !taken_up(library.hypotheses[h]) && s < library.hypotheses[h].shapes.size(); ++s)
       tasks.push_back({static_cast<int>(h), static_cast<int>(s)});
+  const Dictionary generic(data);
+  const std::size_t effects = tasks.size();
+  if (options.dictionary)
+    for (std::size_t d = 0; d < generic.size(); ++d) tasks.push_back({-1, static_cast<int>(d)});
   std::vector<Done> done(tasks.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t t = next++; t < tasks.size(); t = next++) {
+      if (t >= effects) {
+        const auto d = static_cast<std::size_t>(tasks[t].shape);
+        Column c;
+        c.name = generic.name(d);
+        c.chain = generic.chain(d);
+        Eigen::VectorXd rows = generic.rows(d);
+        summarise(rows, c);
+        done[t].columns.push_back(std::move(c));
+        continue;
+      }
       const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(tasks[t].hypothesis)];
       const Values& shape = h.shapes[static_cast<std::size_t>(tasks[t].shape)];
       const std::vector<Values> ways = directions(h, shape);
@@ -168,7 +205,7 @@ Screen screen(const Predictor& predictor, const Fit& fit, const Library& library
       std::vector<bool> positive;
       Done& result = done[t];
       for (std::size_t a = 0; a < ways.size(); ++a) {
-        Eigen::VectorXd column = response(predictor, fit, here, {&h, ways[a]}, weights);
+        Eigen::VectorXd column = response(predictor, *place.fit, place.here, {&h, ways[a]}, *place.weights);
         Column c;
         c.hypothesis = tasks[t].hypothesis;
         c.shape = tasks[t].shape;
@@ -181,7 +218,8 @@ Screen screen(const Predictor& predictor, const Fit& fit, const Library& library
         bool one_way = true;
         for (int i = 0; i < h.info().parameter_count; ++i) {
           const auto k = static_cast<std::size_t>(i);
-          if (!h.amplitude[k] || (ways.size() > 1 && ways[a][k] == h.info().parameters[i].null_value)) continue;
+          if (!h.amplitude[k] || (ways.size() > 1 && ways[a][k] == h.info().parameters[i].null_value))
+            continue;
           const double null = h.info().parameters[i].null_value;
           if (h.lower[k] < null && h.upper[k] > null) one_way = false;
         }
@@ -224,38 +262,61 @@ Screen screen(const Predictor& predictor, const Fit& fit, const Library& library
   Screen result;
   for (Done& d : done)
     for (Column& c : d.columns) result.columns.push_back(std::move(c));
-  if (options.dictionary) {
-    for (DictionaryColumn& d : dictionary(predictor)) {
-      Column c;
-      c.name = d.name;
-      summarise(d.rows, c);
-      result.columns.push_back(std::move(c));
-    }
+  // Scatter of a score per unit of norm, and how many blocks carry it. A column that few blocks of its chain carry takes the
+  // largest scatter that any function of the signals has there: slow noise scatters slow columns most.
+  std::vector<double> units;
+  double high[kChains] = {1, 1, 1, 1}, chain_blocks[kChains] = {};
+  {
+    std::vector<std::vector<char>> seen(kChains, std::vector<char>(static_cast<std::size_t>(blocks), 0));
+    for (const Row& row : data.rows) seen[static_cast<std::size_t>(row.chain)][row.block] = 1;
+    for (int c = 0; c < kChains; ++c)
+      chain_blocks[c] = static_cast<double>(
+          std::count(seen[static_cast<std::size_t>(c)].begin(), seen[static_cast<std::size_t>(c)].end(), 1));
   }
-  // Scatter of a score per unit of norm, over blocks that carry a column at all.
-  std::vector<double> ratios;
-  for (const Column& c : result.columns)
-    for (Eigen::Index b = 0; b < blocks; ++b)
-      if (c.norm2 > 0 && c.block_norm[b] > 0.2 * c.norm2 / static_cast<double>(blocks))
-        ratios.push_back(c.block_score[b] * c.block_score[b] / c.block_norm[b]);
-  if (!ratios.empty()) result.noise_unit = std::max(0.05, series::median(ratios) / 0.455);
-
+  const auto chains_of = [&](const Column& c) {
+    return c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
+                             : bit(c.chain);
+  };
+  for (Column& c : result.columns) {
+    if (c.norm2 <= 0) continue;
+    c.unit = c.block_score.squaredNorm() / c.norm2;
+    c.carried_by = c.norm2 * c.norm2 / c.block_norm.squaredNorm();
+    if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
+    if (c.hypothesis < 0) high[static_cast<int>(c.chain)] = std::max(high[static_cast<int>(c.chain)], c.unit);
+  }
+  if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
   Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
   double rare = 0;
+  std::size_t rare_columns = 0;
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
-    scores.col(static_cast<Eigen::Index>(k)) = result.columns[k].block_score;
-    const Column& c = result.columns[k];
-    if (c.norm2 > 0) rare = std::max(rare, std::abs(c.score) / std::sqrt(result.noise_unit * c.norm2));
+    Column& c = result.columns[k];
+    scores.col(static_cast<Eigen::Index>(k)) = c.block_score;
+    double unit = 0, most = 0;
+    for (int chain = 0; chain < kChains; ++chain)
+      if ((chains_of(c) & (1U << chain)) != 0) {
+        unit = std::max(unit, high[chain]);
+        most = std::max(most, chain_blocks[chain]);
+      }
+    if (c.norm2 > 0 && c.carried_by < kCarryingBlocks && most >= 2 * kCarryingBlocks && c.hypothesis >= 0) {
+      c.rare_z = std::abs(c.score) / std::sqrt(unit * c.norm2);
+      ++rare_columns;
+    }
+    rare = std::max(rare, c.rare_z);
   }
-  result.p_value = flip_p_value(scores, options.flips, options.seed, &result.max_T);
-  result.rare_p = std::min(1.0, 2 * upper_tail(rare) * static_cast<double>(result.columns.size()));
+  const FlipTest test = flip_test(scores, options.flips, options.seed, options.significance);
+  result.p_value = test.p_value;
+  result.max_T = test.statistic;
+  result.limit = test.limit;
+  result.rare_limit = std::sqrt(2.0) * 3.2 + 0.3 * std::log(1.0 + static_cast<double>(rare_columns));
+  result.rare_p =
+      std::min(1.0, 2 * upper_tail(rare) * static_cast<double>(std::max<std::size_t>(1, rare_columns)));
 
   // The best shape speaks for a hypothesis.
   std::vector<Screened> best(library.hypotheses.size());
   for (const Done& d : done) {
+    if (d.screened.hypothesis < 0) continue;
     Screened s = d.screened;
-    for (const Column& c : d.columns)
-      if (c.norm2 > 0) s.rare_z = std::max(s.rare_z, std::abs(c.score) / std::sqrt(result.noise_unit * c.norm2));
+    for (const Column& c : d.columns) s.rare_z = std::max(s.rare_z, c.rare_z);
     Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
     const double reach = std::max(b.reach, s.reach);
     if (b.hypothesis < 0 || s.gain > b.gain) b = s;

@@ -14,10 +14,11 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "isac/explain/fit.hpp"
+#include "isac/explain/refine.hpp"
 
 namespace isac::explain {
 
@@ -25,53 +26,75 @@ namespace isac::explain {
 struct Column {
   int hypothesis = -1;  ///< index in the library, −1 for the generic dictionary
   int shape = 0, amplitude = 0;
-  std::string name;           ///< of a dictionary column
+  std::string name;                         ///< of a dictionary column
+  Chain chain = Chain::kTorque;             ///< of a dictionary column
   Eigen::VectorXd block_score, block_norm;  ///< g_b, Σ x⊥²
-  double score = 0, norm2 = 0;  ///< Σ g_b, Σ x⊥²
-  double raw_norm2 = 0;         ///< Σ x²: what was there before the projection
+  double score = 0, norm2 = 0;              ///< Σ g_b, Σ x⊥²
+  double raw_norm2 = 0;                     ///< Σ x²: what was there before the projection
   double T = 0;
+  double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
+  double carried_by = 0;  ///< blocks, effectively
+  double rare_z = 0;
 };
 
 struct Screened {
   int hypothesis = -1, shape = 0;
-  Values start{};        ///< amplitudes as a linear fit would have them
-  double gain = 0;       ///< drop of the loss by that linear fit, within the signs that the effect allows
-  double T = 0;          ///< largest of its columns
-  double rare_z = 0;     ///< largest of its columns' scores against the scatter of blocks elsewhere
-  double reach = 0;      ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
+  Values start{};     ///< amplitudes as a linear fit would have them
+  double gain = 0;    ///< drop of the loss by that linear fit, within the signs that the effect allows
+  double T = 0;       ///< largest of its columns
+  double rare_z = 0;  ///< largest of its columns' scores against the scatter of blocks elsewhere
+  double reach =
+      0;  ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
 };
 
 struct Screen {
   std::vector<Screened> candidates;  ///< best shape of each hypothesis, largest gain first
   std::vector<Column> columns;       ///< all, without their rows
   double max_T = 0;
-  double p_value = 1;       ///< of the largest T, by flips
-  double rare_p = 1;        ///< of the largest rare score, Bonferroni
-  double noise_unit = 1;    ///< variance of a score per unit of norm: 1 for white rows of unit variance
+  double p_value = 1;  ///< of the largest T, by flips
+  double limit = 0,
+         rare_limit = 0;  ///< T and rare score beyond which a column is significant in this whole search
+  double rare_p = 1;      ///< of the largest rare score, Bonferroni
+  double noise_unit =
+      1;  ///< variance of a score per unit of norm, the middle of all columns: 1 for white rows
 };
 
 struct ScreenOptions {
   int flips = 1999;
+  double significance = 0.005;
   std::uint64_t seed = 1;
   int threads = 2;
   bool dictionary = false;  ///< the generic functions too
 };
 
-[[nodiscard]] Screen screen(const Predictor& predictor, const Fit& fit, const Library& library, const Weights& weights,
-                            const ScreenOptions& options);
+[[nodiscard]] Screen screen(const Around& place, const Library& library, const ScreenOptions& options);
 
 /// Orthonormal basis of the fitted parameters' sensitivities.
 [[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);
 
 /// p-value of the largest |Σ g|/√Σ g² over columns (rows: blocks), by joint sign flips of the blocks.
-[[nodiscard]] double flip_p_value(const Eigen::MatrixXd& block_scores, int flips, std::uint64_t seed, double* statistic = nullptr);
+struct FlipTest {
+  double statistic = 0, p_value = 1;
+  double limit = 0;  ///< that the largest T of noise passes with the probability asked for
+};
+[[nodiscard]] FlipTest flip_test(const Eigen::MatrixXd& block_scores, int flips, std::uint64_t seed,
+                                 double significance);
 
 /// Generic functions of the measured signals, one column each: what an unknown effect may look like.
-struct DictionaryColumn {
-  std::string name;
-  std::vector<std::string> variables;
-  Eigen::VectorXd rows;
+class Dictionary {
+ public:
+  explicit Dictionary(const Prepared& data);
+  [[nodiscard]] std::size_t size() const noexcept;
+  [[nodiscard]] std::string name(std::size_t column) const;  ///< "torque: sgn |angle|"
+  [[nodiscard]] Chain chain(std::size_t column) const;
+  [[nodiscard]] std::vector<std::string> variables(std::size_t column) const;
+  [[nodiscard]] Eigen::VectorXd rows(std::size_t column) const;
+
+ private:
+  struct Signals;
+  const Prepared* data_;
+  std::shared_ptr<const Signals> signals_;
+  std::vector<Chain> chains_;
 };
-[[nodiscard]] std::vector<DictionaryColumn> dictionary(const Predictor& predictor);
 
 }  // namespace isac::explain

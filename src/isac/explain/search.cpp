@@ -15,27 +15,20 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kShortlist = 9;
-constexpr double kWorthRefitting = 0.25;   // of the best linear gain: a candidate below it is not refitted…
+constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
 
-/// White noise of one sample, from differences that a smooth signal does not pass.
-double white_noise(const std::vector<const std::vector<double>*>& signals) {
-  std::vector<double> d;
-  for (const std::vector<double>* x : signals)
-    for (std::size_t k = 2; k + 2 < x->size(); k += 3) {
-      const double v = (*x)[k - 2] - 4 * (*x)[k - 1] + 6 * (*x)[k] - 4 * (*x)[k + 1] + (*x)[k + 2];
-      if (std::isfinite(v)) d.push_back(v);
-    }
-  return series::robust_deviation(d, true) / std::sqrt(70.0);
-}
-
 Floors floors_of(const Prepared& data) {
   Floors floors;
-  std::vector<const std::vector<double>*> torque, p1, p2;
-  for (const PreparedRun& run : data.runs)
+  std::vector<const std::vector<double>*> torque, pressure;
+  for (const PreparedRun& run : data.runs) {
     if (run.has_torque) torque.push_back(&run.torque);
+    for (const auto& p : run.raw_pressure)
+      if (!p.empty()) pressure.push_back(&p);
+  }
   if (!torque.empty()) floors.white[0] = floors.white[3] = white_noise(torque);
+  if (!pressure.empty()) floors.white[1] = floors.white[2] = white_noise(pressure);
   return floors;
 }
 
@@ -68,7 +61,8 @@ void reweight(const Predictor& predictor, const Fit& fit, Weights& weights) {
     const double spread = series::robust_deviation(fast);
     if (spread > 0 && std::isfinite(spread)) weights.sigma[c] *= spread;
   }
-  if (data.has(Chain::kPressure1)) weights.sigma[1] = weights.sigma[2] = std::max(weights.sigma[1], weights.sigma[2]);
+  if (data.has(Chain::kPressure1))
+    weights.sigma[1] = weights.sigma[2] = std::max(weights.sigma[1], weights.sigma[2]);
 }
 
 double correlation_seconds(const Prepared& data, const Fit& fit) {
@@ -97,14 +91,20 @@ class Search {
   Found run() {
     found_.floors = floors_of(data_);
     first_weights();
-    for (int round = 0; round < 2; ++round) {
-      found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
-      reweight(predictor_, found_.baseline, found_.weights);
-    }
+    found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+    reweight(predictor_, found_.baseline, found_.weights);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     choose_blocks(found_.baseline);
-    say(fmt::format("baseline fitted: {} rows, {} blocks of {:.1f} s", data_.rows.size(), data_.blocks, data_.block_seconds));
+    for (std::size_t i = 0; i < found_.baseline.tolerances; ++i)
+      say(fmt::format("  tolerance {} = {:.3g}", found_.baseline.model.effects[i].hypothesis->id(),
+                      found_.baseline.model.effects[i].values[0]));
+    for (std::size_t i = 0; i < found_.baseline.model.rest.size(); ++i)
+      if (found_.baseline.model.rest[i] != 0)
+        say(fmt::format("  rest {} = {:.3g}", i, found_.baseline.model.rest[i]));
+    say(fmt::format("baseline fitted: {} rows, {} blocks of {:.1f} s", data_.rows.size(), data_.blocks,
+                    data_.block_seconds));
     found_.model = found_.baseline;
+    place_ = around(predictor_, found_.model, found_.weights);
     for (int step = 0; step < options_.most_effects; ++step) {
       if (!advance()) break;
     }
@@ -125,7 +125,10 @@ class Search {
 
   void first_weights() {
     for (int c = 0; c < kChains; ++c) found_.weights.sigma[c] = 1e-9;
-    for (int c : {0, 3}) found_.weights.sigma[c] = std::isfinite(found_.floors.white[c]) && found_.floors.white[c] > 0 ? 0.4 * found_.floors.white[c] : 1e-3;
+    for (int c : {0, 3})
+      found_.weights.sigma[c] = std::isfinite(found_.floors.white[c]) && found_.floors.white[c] > 0
+                                    ? 0.4 * found_.floors.white[c]
+                                    : 1e-3;
     found_.weights.sigma[1] = found_.weights.sigma[2] = 150.0;  // Pa
   }
 
@@ -143,8 +146,13 @@ class Search {
   }
 
   Screen screen_of(const Fit& fit) const {
-    return screen(predictor_, fit, library_, found_.weights,
-                  {.flips = 1999, .seed = options_.seed, .threads = options_.threads, .dictionary = true});
+    (void)fit;
+    return screen(place_, library_,
+                  {.flips = 1999,
+                   .significance = 0.5 * options_.significance,
+                   .seed = options_.seed,
+                   .threads = options_.threads,
+                   .dictionary = true});
   }
 
   /// Size of the largest single response that the data asks for, over the floor of its chain.
@@ -152,16 +160,51 @@ class Search {
     Gate gate;
     gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
     gate.significant = gate.p_value <= options_.significance;
-    const Hypothesis* best = nullptr;
     for (const Screened& c : s.candidates) {
       if (c.gain <= 0) break;
-      best = &library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
-      const double size = size_of_gain(c.gain, best->chains, &gate.chain);
-      gate.size = std::max(gate.size, size);
-      break;
+      if (!significant(c, s)) continue;
+      Chain chain{};
+      const double size =
+          size_of_gain(c.gain, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains, &chain);
+      if (size > gate.size) {
+        gate.size = size;
+        gate.chain = chain;
+      }
+    }
+    if (std::getenv("ISAC_EXPLAIN_DEBUG") != nullptr) {
+      for (std::size_t r = 0; r < data_.runs.size(); ++r) {
+        double sum[kChains] = {}, count[kChains] = {};
+        for (std::size_t i = data_.run_begin[r]; i < data_.run_begin[r + 1]; ++i) {
+          const auto c = static_cast<std::size_t>(data_.rows[i].chain);
+          sum[c] += fit.residual[static_cast<Eigen::Index>(i)] * fit.residual[static_cast<Eigen::Index>(i)];
+          ++count[c];
+        }
+        say(fmt::format("    run {} {} day {:.0f}: {:.2f} {:.2f} {:.2f} {:.2f}", data_.runs[r].name,
+                        data_.runs[r].experiment, data_.runs[r].day_offset, std::sqrt(sum[0] / count[0]),
+                        std::sqrt(sum[1] / count[1]), std::sqrt(sum[2] / count[2]),
+                        std::sqrt(sum[3] / count[3])));
+      }
+      std::vector<const Column*> order;
+      for (const Column& c : s.columns) order.push_back(&c);
+      std::sort(order.begin(), order.end(),
+                [](const Column* a, const Column* b) { return a->rare_z > b->rare_z; });
+      for (std::size_t i = 0; i < 6 && i < order.size(); ++i)
+        say(fmt::format("    rare {:.1f} T {:.1f} unit {:.2f} {} {}", order[i]->rare_z, order[i]->T,
+                        order[i]->unit, order[i]->name,
+                        order[i]->hypothesis >= 0
+                            ? library_.hypotheses[static_cast<std::size_t>(order[i]->hypothesis)].id()
+                            : ""));
+      std::sort(order.begin(), order.end(), [](const Column* a, const Column* b) { return a->T > b->T; });
+      for (std::size_t i = 0; i < 6 && i < order.size(); ++i)
+        say(fmt::format("    T {:.1f} rare {:.1f} unit {:.2f} {} {}", order[i]->T, order[i]->rare_z,
+                        order[i]->unit, order[i]->name,
+                        order[i]->hypothesis >= 0
+                            ? library_.hypotheses[static_cast<std::size_t>(order[i]->hypothesis)].id()
+                            : ""));
+      say(fmt::format("    p flips {:.4g} rare {:.4g} maxT {:.2f}", s.p_value, s.rare_p, s.max_T));
     }
     for (const Column& c : s.columns) {
-      if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
+      if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
       const double gain = c.score * c.score / c.norm2;
       const unsigned chains = c.name.starts_with("torque")   ? bit(Chain::kTorque)
                               : c.name.starts_with("motion") ? bit(Chain::kMotion)
@@ -176,6 +219,10 @@ class Search {
     (void)fit;
     gate.material = gate.size >= options_.material;
     return gate;
+  }
+
+  static bool significant(const Screened& c, const Screen& s) {
+    return c.T >= s.limit || c.rare_z >= s.rare_limit;
   }
 
   /// If all of a gain came from one chain: its rms over the floor; the chain with most rows of those that may be.
@@ -209,6 +256,7 @@ class Search {
     for (const Screened& c : s.candidates) {
       if (c.gain <= 0) break;
       if (list.size() >= kShortlist) break;
+      if (!significant(c, s) && c.gain < 0.5 * best) continue;
       if (c.gain < kWorthRefitting * best && c.gain < kWorthRefittingUnits * s.noise_unit) break;
       if (c.gain < 0.15 * best && list.size() >= 4) break;
       const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
@@ -219,23 +267,22 @@ class Search {
     return list;
   }
 
-  std::vector<Trial> refit_all(const Fit& from, const std::vector<Screened>& list) const {
+  std::vector<Trial> refit_all(const std::vector<Screened>& list) const {
     std::vector<Trial> trials(list.size());
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
       for (std::size_t i = next++; i < list.size(); i = next++) {
         const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
-        Active a;
-        a.hypothesis = &h;
-        a.values = list[i].start;
-        trials[i].hypothesis = list[i].hypothesis;
-        trials[i].fit = refit(predictor_, from, {a}, found_.weights);
+        Refined refined = refine(place_, h, list[i].start);
         // Where the linear start was a bad one, the shape's own values are another.
-        if (!h.info().linear && trials[i].fit.loss > from.loss - 0.5 * list[i].gain) {
-          a.values = h.shapes[static_cast<std::size_t>(list[i].shape)];
-          Fit other = refit(predictor_, from, {a}, found_.weights);
-          if (other.loss < trials[i].fit.loss) trials[i].fit = std::move(other);
+        if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
+          Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
+          if (other.loss < refined.loss) refined = std::move(other);
         }
+        trials[i].hypothesis = list[i].hypothesis;
+        trials[i].values = refined.values;
+        trials[i].residual = std::move(refined.residual);
+        trials[i].loss = refined.loss;
       }
     };
     std::vector<std::thread> pool;
@@ -245,23 +292,28 @@ class Search {
     return trials;
   }
 
-  int parameters_of(const Trial& t) const { return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].parameters(); }
-  std::string id_of(const Trial& t) const { return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id(); }
+  int parameters_of(const Trial& t) const {
+    return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].parameters();
+  }
+  std::string id_of(const Trial& t) const {
+    return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
+  }
 
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
-  void rank(std::vector<Trial>& trials, const Fit& from, double unit) const {
+  void rank(std::vector<Trial>& trials, double unit) const {
     if (trials.empty()) return;
-    const auto penalised = [&](const Trial& t) { return t.fit.loss + 2 * unit * parameters_of(t); };
-    std::stable_sort(trials.begin(), trials.end(), [&](const Trial& a, const Trial& b) { return penalised(a) < penalised(b); });
+    const auto penalised = [&](const Trial& t) { return t.loss + 2 * unit * parameters_of(t); };
+    std::stable_sort(trials.begin(), trials.end(),
+                     [&](const Trial& a, const Trial& b) { return penalised(a) < penalised(b); });
     // The best reading of an effect speaks for it.
     std::set<std::string> seen;
     std::erase_if(trials, [&](const Trial& t) { return !seen.insert(id_of(t)).second; });
     const auto mark = [&] {
       const Trial& best = trials.front();
       for (Trial& t : trials) {
-        t.behind = compare(data_, best.fit, t.fit, parameters_of(t) - parameters_of(best), unit);
+        t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
         t.in_set = &t == &best || cannot_rule_out(t.behind);
-        t.material = size_over_floor(data_, found_.weights, found_.floors, t.fit.residual - from.residual);
+        t.material = size_over_floor(data_, found_.weights, found_.floors, t.residual - place_.residual);
       }
     };
     mark();
@@ -270,7 +322,8 @@ class Search {
       changed = false;
       for (std::size_t i = 1; i < trials.size(); ++i) {
         if (!trials[i].in_set || !nests(id_of(trials[0]), id_of(trials[i]))) continue;
-        std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i), trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+        std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
+                    trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
         mark();
         changed = true;
         break;
@@ -303,15 +356,19 @@ class Search {
     }
     const std::vector<Screened> list = shortlist(step.screen);
     std::string names;
-    for (const Screened& c : list) names += (names.empty() ? "" : ", ") + library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id();
-    say(fmt::format("something is missing (p = {:.3g}, {:.2f} of the noise floor); refitting {}", step.gate.p_value, step.gate.size, names));
-    step.trials = refit_all(found_.model, list);
-    rank(step.trials, found_.model, step.screen.noise_unit);
+    for (const Screened& c : list)
+      names += (names.empty() ? "" : ", ") + library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id();
+    say(fmt::format("something is missing (p = {:.3g}, {:.2f} of the noise floor); refitting {}",
+                    step.gate.p_value, step.gate.size, names));
+    step.trials = refit_all(list);
+    rank(step.trials, step.screen.noise_unit);
     for (const Trial& t : step.trials) {
       const Trial& best = step.trials.front();
       const std::string sentence =
-          &t == &best ? fmt::format("closes {:.0f} units of noise", (found_.model.loss - t.fit.loss) / step.screen.noise_unit)
-          : t.in_set  ? fmt::format("cannot be told from {} ({:.1f} sigma of data between them)", id_of(best), t.behind.separation)
+          &t == &best ? fmt::format("closes {:.0f} units of noise",
+                                    (place_.residual.squaredNorm() - t.loss) / step.screen.noise_unit)
+          : t.in_set  ? fmt::format("cannot be told from {} ({:.1f} sigma of data between them)", id_of(best),
+                                    t.behind.separation)
                       : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, id_of(best));
       found_.notes.push_back({id_of(t), sentence});
       say(id_of(t) + ": " + sentence);
@@ -323,7 +380,11 @@ class Search {
     }
     const Trial& best = step.trials.front();
     found_.added.push_back(best.hypothesis);
-    found_.model = best.fit;
+    Active active;
+    active.hypothesis = &library_.hypotheses[static_cast<std::size_t>(best.hypothesis)];
+    active.values = best.values;
+    found_.model = refit(predictor_, found_.model, {active}, found_.weights, 6);
+    place_ = around(predictor_, found_.model, found_.weights);
     found_.steps.push_back(std::move(step));
     return true;
   }
@@ -333,6 +394,7 @@ class Search {
   Prepared& data_;
   const ExplainOptions& options_;
   Found found_;
+  Around place_;  ///< of found_.model
 };
 
 }  // namespace
@@ -348,7 +410,8 @@ double size_over_floor(const Prepared& data, const Weights& weights, const Floor
   }
   for (int c = 0; c < kChains; ++c) {
     if (rows[c] == 0) continue;
-    const double floor = std::isfinite(floors.white[c]) ? std::max(floors.white[c], weights.sigma[c]) : weights.sigma[c];
+    const double floor =
+        std::isfinite(floors.white[c]) ? std::max(floors.white[c], weights.sigma[c]) : weights.sigma[c];
     const double size = std::sqrt(sum[c] / static_cast<double>(rows[c])) * weights.sigma[c] / floor;
     if (size > best) {
       best = size;
@@ -358,7 +421,8 @@ double size_over_floor(const Prepared& data, const Weights& weights, const Floor
   return best;
 }
 
-Found search(const Predictor& predictor, const Library& library, Prepared& data, const ExplainOptions& options) {
+Found search(const Predictor& predictor, const Library& library, Prepared& data,
+             const ExplainOptions& options) {
   return Search(predictor, library, data, options).run();
 }
 

@@ -16,17 +16,20 @@
 namespace isac::explain {
 
 struct Floors {
-  double white[kChains] = {kNotKnown, kNotKnown, kNotKnown, kNotKnown};  ///< of one sample at the recording's rate, N m or Pa
+  double white[kChains] = {kNotKnown, kNotKnown, kNotKnown,
+                           kNotKnown};  ///< of one sample at the recording's rate, N m or Pa
   std::string from[kChains];
 };
 
 /// A candidate that was refitted beside what was there already.
 struct Trial {
   int hypothesis = -1;
-  Fit fit;
-  Comparison behind;     ///< of the best trial
-  double weight = 0;     ///< share of belief among the trials
-  double material = 0;   ///< rms of what it explains over the floor of the chain where it shows most
+  Values values{};
+  Eigen::VectorXd residual;  ///< weighted, all rows; of the refit, with the model's parameters eliminated
+  double loss = 0;
+  Comparison behind;    ///< of the best trial
+  double weight = 0;    ///< share of belief among the trials
+  double material = 0;  ///< rms of what it explains over the floor of the chain where it shows most
   bool in_set = false;
 };
 
@@ -47,14 +50,15 @@ struct Found {
   Fit baseline, model;
   Weights weights;
   Floors floors;
-  std::vector<Step> steps;       ///< one for each effect that was added, and the last that was not
-  std::vector<int> added;        ///< hypotheses, in order
-  bool adequate = true;          ///< nothing significant and material is left
-  Gate gate;                     ///< of the baseline
+  std::vector<Step> steps;  ///< one for each effect that was added, and the last that was not
+  std::vector<int> added;   ///< hypotheses, in order
+  bool adequate = true;     ///< nothing significant and material is left
+  Gate gate;                ///< of the baseline
   std::vector<TrialNote> notes;
 };
 
-[[nodiscard]] Found search(const Predictor& predictor, const Library& library, Prepared& data, const ExplainOptions& options);
+[[nodiscard]] Found search(const Predictor& predictor, const Library& library, Prepared& data,
+                           const ExplainOptions& options);
 
 /// rms over the floor, chain by chain, of what distinguishes two weighted residuals; the largest and where.
 [[nodiscard]] double size_over_floor(const Prepared& data, const Weights& weights, const Floors& floors,

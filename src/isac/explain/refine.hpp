@@ -1,0 +1,43 @@
+/// @file
+/// Refit of one effect beside a model whose own parameters are eliminated by projection: what a search can afford for each
+/// of its candidates.
+///
+///   r(q) = (1 − Q Qᵀ)(r₀ + x(q)),   min ‖r(q)‖² over the effect's parameters q within their bounds, by Ceres
+///
+/// r₀ is the model's residual, x(q) the effect's response, Q an orthonormal basis of the sensitivities of all that was fitted:
+/// a linear change of the model's parameters costs nothing. fit.hpp's refit() repeats the winners without that linearisation.
+/// Threads: safe on separate arguments. Errors: none. Source: Golub and Pereyra 1973; docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "isac/explain/fit.hpp"
+
+namespace isac::explain {
+
+/// A model in whose surroundings effects are tried.
+struct Around {
+  const Predictor* predictor = nullptr;
+  const Fit* fit = nullptr;
+  const Weights* weights = nullptr;
+  Eigen::MatrixXd basis;     ///< Q
+  Eigen::VectorXd here;      ///< its prediction of all rows
+  Eigen::VectorXd residual;  ///< (1 − Q Qᵀ) r₀
+
+  [[nodiscard]] Eigen::VectorXd project(const Eigen::VectorXd& x) const {
+    return x - basis * (basis.transpose() * x);
+  }
+};
+
+[[nodiscard]] Around around(const Predictor& predictor, const Fit& fit, const Weights& weights);
+
+struct Refined {
+  Values values{};
+  Eigen::VectorXd residual;  ///< r(q), all rows
+  double loss = 0;
+};
+
+[[nodiscard]] Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& start,
+                             int iterations = 8);
+
+}  // namespace isac::explain
