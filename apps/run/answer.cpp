@@ -77,6 +77,18 @@ std::string end_sentence(const ControlRun& run, const ControlOutcome& outcome) {
   return {};
 }
 
+/// What the watches noticed that stopped nothing; late cycles are counted elsewhere.
+Warnings noticed(const ControlOutcome& outcome) {
+  Warnings all;
+  if ((outcome.warnings & control::kEncoderFrozen) != 0)
+    all.push_back(
+        {"encoder_frozen", "an encoder stood still while the pressures moved; check its plug and coupling"});
+  if ((outcome.warnings & control::kNearLimit) != 0)
+    all.push_back({"near_limit",
+                   "a limit of the rig was passed, though not so far or so long that it stopped the run"});
+  return all;
+}
+
 }  // namespace
 
 int exit_code_of(const ControlRun& run, const ControlOutcome& outcome) {
@@ -132,7 +144,9 @@ std::string format_run(const ControlRun& run, const ControlOutcome& outcome, con
                         {"largest", {{"value", outcome.comparison.largest}, {"unit", "Pa"}}}};
   }
   answer["warnings"] = Json::array();
-  for (const Warning& warning : warnings)
+  Warnings all = warnings;
+  for (Warning& warning : noticed(outcome)) all.push_back(std::move(warning));
+  for (const Warning& warning : all)
     answer["warnings"].push_back({{"code", warning.code}, {"text", warning.text}});
   return answer.dump(2);
 }
@@ -147,6 +161,7 @@ std::string run_words(const ControlRun& run, const ControlOutcome& outcome) {
   if (!run.log.empty() && outcome.told)
     text += fmt::format("{} rows in {}{}.\n", outcome.rows, run.log.string(),
                         outcome.dropped > 0 ? fmt::format(", {} lost", outcome.dropped) : "");
+  for (const Warning& warning : noticed(outcome)) text += "Warning: " + warning.text + ".\n";
   if (!outcome.flight.empty()) text += fmt::format("The last cycles are in {}.\n", outcome.flight.string());
   if (!run.replayed.empty()) {
     const runtime::CommandComparison& same = outcome.comparison;

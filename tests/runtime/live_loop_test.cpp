@@ -55,6 +55,17 @@ TEST(ControlLoop, gives_up_on_a_card_that_never_gets_plausible_and_says_what_it_
   EXPECT_EQ(bench.card.writes, 0);
 }
 
+TEST(ControlLoop, gives_up_at_once_on_a_card_that_does_not_answer) {
+  Bench bench;
+  bench.card.fail_after = 0;
+  const std::atomic<bool> stop{false};
+  const LoopEnd end = bench.loop->run(bench.director, stop, nullptr, nullptr);
+  EXPECT_EQ(end.why, LoopEnd::Why::kFault);
+  EXPECT_EQ(end.cause.code, FaultCode::kReadFailed);
+  EXPECT_EQ(end.cycles, 1);
+  EXPECT_EQ(bench.card.writes, 0);
+}
+
 TEST(ControlLoop, brings_both_pressures_up_together_before_the_controller_takes_over) {
   Bench bench([](runtime::ControlSettings& s) { s.run_up = 1.0; });
   bench.cycles(102);

@@ -32,9 +32,10 @@ std::int64_t now_ns() noexcept {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
 }
 
-/// Runs the loop above ordinary programs, and its watcher above the loop.
+/// The watcher runs above the loop, and from memory that is there. Where that is not permitted: ordinary.
 void take_priority(int priority) noexcept {
   if (priority <= 0) return;
+  static_cast<void>(mlockall(MCL_CURRENT));
   sched_param wanted{};
   wanted.sched_priority = priority;
   static_cast<void>(
@@ -44,6 +45,7 @@ void take_priority(int priority) noexcept {
 void give_priority_back() noexcept {
   const sched_param ordinary{};
   static_cast<void>(sched_setscheduler(0, SCHED_OTHER, &ordinary));
+  static_cast<void>(munlockall());
 }
 
 [[noreturn]] void be_the_child(pid_t parent, const std::function<int()>& child) {
