@@ -104,6 +104,23 @@ TEST(IsacRun, step_arrives) {
   EXPECT_EQ(json["rows"].get<std::size_t>(), read.rows());
 }
 
+TEST(IsacRun, answer_has_the_keys_that_the_page_shows) {
+  const ScratchFolder folder;
+  ASSERT_EQ(run({"position", "--step", "0.3 rad", "--json", folder / "run.json"}).exit_code, 0);
+  const std::string page = read_text(std::string(ISAC_SOURCE_DIR) + "/docs/how-to/run.md");
+  const std::size_t begin = page.find("```json\n") + 8;
+  const Json shown = Json::parse(page.substr(begin, page.find("```", begin) - begin));
+  const Json said = answer_of(folder / "run.json");
+  const auto keys = [](const Json& object) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : object.items()) names.push_back(name);
+    return names;
+  };
+  EXPECT_EQ(keys(said), keys(shown));
+  for (const char* part : {"duration", "longest_late", "supervisor"})
+    EXPECT_EQ(keys(said[part]), keys(shown[part]));
+}
+
 TEST(IsacRun, every_mode_runs_on_the_simulated_rig) {
   const ScratchFolder folder;
   std::ofstream(folder / "points.csv") << "time [s],angle [deg]\n0,0\n1,10\n2,-5\n";
