@@ -277,6 +277,17 @@ TEST(IsacRun, hung_loop_is_vented_by_the_supervisor) {
   EXPECT_GE(read_recording(folder / "run.flight.csv").rows(), 50u);
 }
 
+TEST(IsacRun, loop_stops_and_closes_its_valves_and_log_when_its_supervisor_is_killed) {
+  const ScratchFolder folder;
+  Background program(long_run(folder), folder / "out");
+  ASSERT_TRUE(valves_are_open(folder / "run.csv")) << read_text(folder / "out");
+  kill(program.pid(), SIGKILL);
+  EXPECT_EQ(program.wait(), -SIGKILL);
+  const auto closed = [&] { return read_text(folder / "run.csv").find("# closed:") != std::string::npos; };
+  for (int k = 0; k < 1000 && !closed(); ++k) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(closed());
+}
+
 TEST(IsacRun, packed_table_and_params_file_drive_alike) {
   const ScratchFolder folder;
   std::ofstream(folder / "params.toml") << R"(format = "isac.params/1"
