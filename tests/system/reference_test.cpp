@@ -42,6 +42,10 @@ TEST(Reference, is_what_the_programs_say_of_themselves) {
       {"isac-log",
        "Records sweeps on a rig; [how to log a sweep](../how-to/log-a-sweep.md) shows it at work.",
        {}},
+      {"isac-explain",
+       "Finds the effect that a model lacks; [how to explain a gap](../how-to/explain.md) shows it at work, "
+       "[formats](../formats.md) has its answer.",
+       {}},
       {"isac-run",
        "Drives joints by the identified model under a supervisor; [how to run](../how-to/run.md) shows it at "
        "work, "

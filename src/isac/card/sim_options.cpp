@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "isac/card/sim_params.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 
@@ -103,6 +104,8 @@ constexpr std::array kOptions{
            [](RigConfig& c, Text n, Text v) { c.timing.drop_chance = number(n, v, 0, 1); }},
     Option{"miscalibrated", "on or off: gains, zeros and encoder middle off the data sheet (off)",
            [](RigConfig& c, Text n, Text v) { c.miscalibrated = on_off(n, v); }},
+    Option{"params", "FILE: parameters and effects of a params.toml; later words win",
+           [](RigConfig& c, Text, Text v) { apply_params(c, std::string(v)); }},
     Option{"effect", "ID:X:...: a hidden effect, its parameters in SI; may be repeated", add_effect},
     Option{"A", "N/m (-23450)", [](RigConfig& c, Text n, Text v) { c.joint.A = number(n, v, -1e8, 0); }},
     Option{"B", "N cm2/kg (174.2)",

@@ -11,12 +11,14 @@
 /// | jitter=on, off | | late sampling instants, noisy stamps (on) |
 /// | drop=X | | chance of a wake-up one period late (0) |
 /// | miscalibrated=on, off | | gains, zeros and the encoder's middle off the data sheet (off) |
+/// | params=FILE | | parameters and effects of a params.toml (sim_params.hpp); later words win |
 /// | effect=ID:X:… | SI | a hidden effect of docs/effects.md; may be given several times |
 /// | A, B, C, D | N/m, N cm2/kg, N m s3, N m s | of eq 3.10 |
 /// | radius, inertia, p0 | m, kg m2, kg/cm2 | of the joint |
 /// | K_C, T_C, T_fill, T_vent, dead_time | -, s | of both valve units; T_C sets T_fill and T_vent |
 ///
-/// Not for the loop (allocates). Errors: parse_sim throws isac::Error (usage) that names the word and lists what it could be.
+/// Not for the loop (allocates). Errors: parse_sim throws isac::Error (usage) that names the word and lists what it could be;
+/// for params=FILE (bad input) with the place in the file.
 #pragma once
 
 #include <string>
