@@ -6,11 +6,13 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <utility>
 
 namespace isac::test {
 namespace {
 
+std::mutex kernel;  ///< as a device's lock there: one caller at a time
 int last_errno = 0;
 comedi_oor_behavior behaviour = COMEDI_OOR_NAN;
 comedi_range answered_range;
@@ -78,6 +80,7 @@ FakeSubdevice* subdevice(comedi_t* it, unsigned index) {
   return index < it->board->subdevices.size() ? &it->board->subdevices[index] : nullptr;
 }
 
+/// One instruction, under the lock.
 int run(comedi_t* it, comedi_insn* insn) {
   FakeBoard& board = *it->board;
   ++board.instructions;
@@ -162,9 +165,11 @@ lsampl_t comedi_from_phys(double value, comedi_range* range, lsampl_t maxdata) {
   return static_cast<lsampl_t>(std::lround((value - range->min) / (range->max - range->min) * maxdata));
 }
 int comedi_do_insn(comedi_t* it, comedi_insn* insn) {
+  const std::scoped_lock lock(isac::test::kernel);
   return run(it, insn);
 }
 int comedi_do_insnlist(comedi_t* it, comedi_insnlist* list) {
+  const std::scoped_lock lock(isac::test::kernel);
   ++it->board->lists;
   for (unsigned k = 0; k < list->n_insns; ++k)
     if (run(it, &list->insns[k]) < 0) return -1;
@@ -172,6 +177,7 @@ int comedi_do_insnlist(comedi_t* it, comedi_insnlist* list) {
 }
 int comedi_data_read(comedi_t* it, unsigned index, unsigned channel, unsigned range, unsigned aref,
                      lsampl_t* data) {
+  const std::scoped_lock lock(isac::test::kernel);
   comedi_insn insn{};
   insn.insn = INSN_READ;
   insn.n = 1;
