@@ -235,7 +235,8 @@ TEST(Jitter, no_wake_up_is_early_and_late_ones_are_never_caught_up) {
   const runtime::Jitter jitter = runtime::measure_jitter(0.2, 1000, stop);
   ASSERT_FALSE(jitter.late.empty());
   EXPECT_GE(jitter.late.front(), 0.0);
-  EXPECT_GE(static_cast<std::int64_t>(jitter.late.size()) + jitter.skipped, 200);  // each slot is taken or skipped
+  EXPECT_GE(static_cast<std::int64_t>(jitter.late.size()) + jitter.skipped,
+            200);  // each slot is taken or skipped
 }
 
 TEST(RealTime, says_plainly_what_is_missing) {
