@@ -36,7 +36,7 @@ struct Words {
   std::string amplitude = "0.2 kg/cm2", centre = "0 kg/cm2", kick = "0.03 rad", first_gain = "1.5 kg/cm2",
               hold = "1.5 s";
   std::string longest = "120 s";
-  double rate = 1000, uncertainty = 3, overshoot = 10, modulus = 0.5, share = 95;
+  double rate = 1000, uncertainty = 3, overshoot = 10, modulus = 0.5, share = 95, least_integral = 0.1;
   int cycles = 10, rounds = 2, draws = 200;
   std::uint64_t seed = 1;
   bool rate_given = false;
@@ -263,8 +263,12 @@ int tune_gains(Words words) {
     for (double& e : errors) e = std::hypot(e, words.uncertainty / 100);
     tune::TuningOptions options{
         .rule = rule_of(words.rule), .limits = limits, .draws = words.draws, .seed = words.seed};
+    options.least_integral = words.least_integral;
     options.stop = [] { return runtime::StopSignals::requested().load(); };
-    tuning = tune::tune_joint(joint->model, tune::independent(errors), joint->gains, options);
+    // The controller will believe the parameters it is given; the joint is what the experiment showed.
+    if (on_the_rig(words) && known) options.measured = joint->model;
+    tuning = tune::tune_joint(known ? known->model : joint->model, tune::independent(errors), joint->gains,
+                              options);
     answer.tuning = &*tuning;
     answer.refusal = tuning->refusal;
   }
@@ -361,6 +365,11 @@ int main(int argc, char** argv) {
       ->group("Limits of the gains");
   app.add_option("--share", w.share, "Of the drawn joints that must hold both, %")
       ->check(CLI::Range(1.0, 100.0))
+      ->capture_default_str()
+      ->group("Limits of the gains");
+  app.add_option("--least-integral", w.least_integral,
+                 "K_I/K_P of the position loop, 1/s; more brings a load's droop back sooner and tracks worse")
+      ->check(CLI::Range(0.0, 5.0))
       ->capture_default_str()
       ->group("Limits of the gains");
   app.add_option("--uncertainty", w.uncertainty,

@@ -214,23 +214,24 @@ std::string render_tune_report(const TuneReportInput& input) {
     page.box(BoxKind::kWarning, "The old gains stay", {"No new gains were written: " + refusal + "."});
   if (chosen != nullptr) {
     const tune::Assessment& a = chosen->figures;
-    page.cards({{.label = "Tracking error",
-                 .value = fixed_decimals(1e3 * a.tracking, 1) + " mrad",
-                 .note = "rms along the trajectory"},
-                {.label = "Overshoot",
-                 .value = fixed_decimals(100 * a.overshoot_p95, 1) + " %",
-                 .note = "worst twentieth of the joints"},
-                {.label = "Modulus margin",
-                 .value = fixed_decimals(a.modulus_p05, 2),
-                 .note = "worst twentieth; asked for " + fixed_decimals(input.limits.modulus, 2)},
-                {.label = "Phase margin",
-                 .value = finite_or(a.margins.phase,
-                                    fixed_decimals(a.margins.phase * kDegreesPerRadian, 0) + "°", "none"),
-                 .note = "delay margin " +
-                         finite_or(a.margins.delay, fixed_decimals(1e3 * a.margins.delay, 0) + " ms", "any")},
-                {.label = "Gain margin",
-                 .value = finite_or(a.margins.gain, fixed_decimals(a.margins.gain, 2), "any"),
-                 .note = "factor"}});
+    page.cards(
+        {{.label = "Tracking error",
+          .value = fixed_decimals(1e3 * a.tracking, 1) + " mrad",
+          .note = "rms along the trajectory"},
+         {.label = "Overshoot",
+          .value = fixed_decimals(100 * a.overshoot_p95, 1) + " %",
+          .note = "worst twentieth of the joints"},
+         {.label = "Modulus margin",
+          .value = fixed_decimals(a.modulus_p05, 2),
+          .note = "worst twentieth; asked for " + fixed_decimals(input.limits.modulus, 2)},
+         {.label = "Phase margin",
+          .value = finite_or(a.margins.phase, fixed_decimals(a.margins.phase * kDegreesPerRadian, 0) + "°",
+                             "none"),
+          .note = "delay margin " + (a.margins.delay > 1 ? std::string("above 1 s")
+                                                         : fixed_decimals(1e3 * a.margins.delay, 0) + " ms")},
+         {.label = "Gain margin",
+          .value = finite_or(a.margins.gain, fixed_decimals(a.margins.gain, 2), "any"),
+          .note = "factor"}});
   }
   page.box(BoxKind::kWarning, "Before you use these gains", warning_texts(input.warnings));
   if (chosen != nullptr && chosen->figures.draws > 0) {

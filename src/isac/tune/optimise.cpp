@@ -49,6 +49,8 @@ class Search {
           std::max(0.0, control::inner_loop_use(loop, options_.loop.sampling.interval) - kMostInnerUse);
       if (penalty > 0.2) return kUnstable * (1 + penalty);
     }
+    if (g.structure != control::Structure::kPid)
+      penalty += 0.2 * std::max(0.0, options_.least_integral - g.position.integral / g.position.proportional);
     // Margins first: they cost a hundredth of a simulation, and an unstable loop needs none.
     for (const JointModel& joint : joints_) {
       const Margins m = margins(control_loop(joint, g, options_.loop.sampling, model_));

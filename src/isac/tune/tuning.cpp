@@ -65,7 +65,8 @@ std::vector<Candidate> gains_by_rule(const JointModel& model, const ClosedLoopOp
 Tuning tune_joint(const JointModel& model, const RelativeCovariance& spread,
                   const std::optional<Gains>& before, const TuningOptions& options) {
   Tuning tuning;
-  const std::vector<JointModel> judged = draw_joints(model, spread, options.draws, options.seed);
+  const JointModel& moving = options.measured ? *options.measured : model;
+  const std::vector<JointModel> judged = draw_joints(moving, spread, options.draws, options.seed);
   const auto judge = [&](Candidate& c) {
     c.figures = assess(model, judged, c.gains, options.limits, options.loop);
   };
@@ -73,7 +74,7 @@ Tuning tune_joint(const JointModel& model, const RelativeCovariance& spread,
     tuning.before = cascade("before", *before);
     judge(*tuning.before);
   }
-  tuning.candidates = gains_by_rule(model, options.loop);
+  tuning.candidates = gains_by_rule(moving, options.loop);
   if (options.rule == Rule::kOptimise) {
     std::vector<Gains> starts;
     for (const Candidate& c : tuning.candidates)
@@ -87,7 +88,8 @@ Tuning tune_joint(const JointModel& model, const RelativeCovariance& spread,
     starts.push_back(before.value_or(seeds));
     OptimiseOptions search{.limits = options.limits, .loop = options.loop};
     search.stop = options.stop;
-    const auto design = draw_joints(model, spread, options.draws, options.seed + 1);
+    search.least_integral = options.least_integral;
+    const auto design = draw_joints(moving, spread, options.draws, options.seed + 1);
     const Optimised best = optimise(model, design, starts, search);
     tuning.evaluations = best.evaluations;
     tuning.candidates.insert(tuning.candidates.begin(), cascade(kOptimisedName, best.gains));

@@ -30,7 +30,10 @@ struct TuningOptions {
   Limits limits{};
   int draws = 200;
   std::uint64_t seed = 1;
-  bool all_rules = true;  ///< judge every rule, not only the one asked for
+  std::optional<JointModel> measured =
+      {};                       ///< the joint that moves, where it is not the one the controller believes in
+  double least_integral = 0.1;  ///< 1/s, see optimise.hpp
+  bool all_rules = true;        ///< judge every rule, not only the one asked for
   ClosedLoopOptions loop{};
   std::function<bool()> stop = {};
 };
