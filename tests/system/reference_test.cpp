@@ -46,6 +46,10 @@ TEST(Reference, is_what_the_programs_say_of_themselves) {
        "Finds the effect that a model lacks; [how to explain a gap](../how-to/explain.md) shows it at work, "
        "[formats](../formats.md) has its answer.",
        {}},
+      {"isac-tune",
+       "Finds the gains of a joint; [how to tune](../how-to/tune.md) shows it at work, [tuning](../tuning.md) what it "
+       "promises and answers.",
+       {}},
       {"isac-run",
        "Drives joints by the identified model under a supervisor; [how to run](../how-to/run.md) shows it at "
        "work, "
