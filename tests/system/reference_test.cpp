@@ -47,7 +47,8 @@ TEST(Reference, is_what_the_programs_say_of_themselves) {
        "[formats](../formats.md) has its answer.",
        {}},
       {"isac-tune",
-       "Finds the gains of a joint; [how to tune](../how-to/tune.md) shows it at work, [tuning](../tuning.md) what it "
+       "Finds the gains of a joint; [how to tune](../how-to/tune.md) shows it at work, "
+       "[tuning](../tuning.md) what it "
        "promises and answers.",
        {}},
       {"isac-run",
