@@ -143,7 +143,7 @@ void print_plan(const explain::Explanation& answer, const std::string& path) {
   } else if (answer.next_experiment) {
     sheet.row("plan", "none was written: no run of this rig as it stands would settle it");
   } else {
-    sheet.row("plan", "none was written: nothing needs to be told apart");
+    sheet.row("plan", "none was written: the answer asks for no experiment");
   }
 }
 

@@ -142,6 +142,12 @@ TEST(ExplainWords, never_say_that_something_is_certain) {
   EXPECT_EQ(joined({"a", "b", "c"}), "a, b and c");
 }
 
+TEST(ExplainWords, write_equations_with_the_letters_of_the_report) {
+  EXPECT_EQ(equation_in_words("-T_c sgn(w)"), "−T_c sgn(φ̇)");
+  EXPECT_EQ(equation_in_words("-dI w'"), "−dI φ̈");
+  EXPECT_EQ(equation_in_words("a sin(2 pi f t + psi)"), "a sin(2 π f t + ψ)");
+}
+
 TEST(ExplainWords, leave_an_explanation_its_own_summary) {
   Explanation e = named_sample();
   e.summary = "It is the chain.";

@@ -146,7 +146,7 @@ void add_candidate(Document& page, const Candidate& candidate) {
   if (std::isfinite(candidate.confidence)) title += ", confidence " + percent(candidate.confidence);
   page.subheading(title + ")");
   std::vector<std::string> lines;
-  if (!candidate.equation.empty()) lines.push_back(candidate.equation);
+  if (!candidate.equation.empty()) lines.push_back(equation_in_words(candidate.equation));
   if (const std::string found = parameters_in_words(candidate); !found.empty()) lines.push_back(found);
   if (!lines.empty()) page.equation(lines);
   if (const auto speaks_for = evidence_of(candidate, true); !speaks_for.empty()) {

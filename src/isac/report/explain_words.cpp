@@ -140,6 +140,34 @@ std::string signal_in_words(const std::string& signal) {
   return signal == "motion" ? "motion (I φ̈ = T)" : signal;
 }
 
+std::string equation_in_words(const std::string& equation) {
+  static const std::map<std::string, std::string> kLetters{
+      {"w", "φ̇"}, {"phi", "φ"}, {"dp", "Δp"}, {"psi", "ψ"}, {"alpha", "α"}, {"pi", "π"}, {"kappa", "κ"}};
+  const auto letter = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (c >= '0' && c <= '9');
+  };
+  std::string out;
+  for (std::size_t i = 0; i < equation.size();) {
+    if (!letter(equation[i])) {
+      out += equation[i] == '-' ? std::string("−") : std::string(1, equation[i]);
+      ++i;
+      continue;
+    }
+    std::size_t end = i;
+    while (end < equation.size() && letter(equation[end])) ++end;
+    const std::string word = equation.substr(i, end - i);
+    const auto known = kLetters.find(word);
+    if (word == "w" && end < equation.size() && equation[end] == '\'') {  // the speed's rate
+      out += "φ̈";
+      ++end;
+    } else {
+      out += known == kLetters.end() ? word : known->second;
+    }
+    i = end;
+  }
+  return out;
+}
+
 std::string percent(double share) {
   if (!std::isfinite(share)) return "–";
   const double value = 100 * share;

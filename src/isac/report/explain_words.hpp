@@ -25,6 +25,8 @@ namespace isac::report {
 [[nodiscard]] std::string variable_in_words(const std::string& variable);
 /// "motion" → "motion (I φ̈ = T)".
 [[nodiscard]] std::string signal_in_words(const std::string& signal);
+/// The catalogue's plain letters as a report writes them: "-T_c sgn(w)" → "−T_c sgn(φ̇)".
+[[nodiscard]] std::string equation_in_words(const std::string& equation);
 /// 0.973 → "97 %"; never "100 %" of what is not certain; "–" for NaN.
 [[nodiscard]] std::string percent(double share);
 /// "a", "a and b", "a, b and c".
