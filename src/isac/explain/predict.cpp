@@ -505,7 +505,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   models::ValvePoint<double> x;
   x.lag = lag;
   const auto rates = [&](const double(&u0)[2], const double(&state)[2], double velocity, double(&v)[2],
-                         bool move_states) {
+                         double move) {
     double u[2] = {gain * u0[0], gain * u0[1]};
     x.pressure[0] = state[0];
     x.pressure[1] = state[1];
@@ -518,7 +518,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
     for (int i = 0; i < 2; ++i) v[i] = (u[i] - state[i]) / lag;
     for (const Placed& e : effects)
       models::effect_pressure_rate(e.active->hypothesis->effect, e.active->values.data(), x, e.z, v);
-    if (!move_states) return;
+    if (!(move > 0)) return;
     double again[2] = {gain * u0[0], gain * u0[1]};
     for (Placed& e : effects) {
       x.command[0] = again[0];
@@ -534,8 +534,8 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
         models::effect_valve_derivative(effect, q, x, u, v, nudged, g);
         models::effect_command(effect, q, x, e.z, again);
         for (int i = 0; i < count; ++i) {
-          const double slope = (g[i] - f[i]) / kNudge * dt;
-          e.z[i] += dt * f[i] * (std::abs(slope) < 1e-9 ? 1.0 : std::expm1(slope) / slope);
+          const double slope = (g[i] - f[i]) / kNudge * move;
+          e.z[i] += move * f[i] * (std::abs(slope) < 1e-9 ? 1.0 : std::expm1(slope) / slope);
         }
       } else {
         models::effect_command(effect, q, x, e.z, again);
@@ -557,6 +557,11 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
     }
   }
   const bool moves = !run.velocity.empty();
+  const bool with_states = std::any_of(effects.begin(), effects.end(), [](const Placed& e) {
+    return e.active->hypothesis->info().state_count > 0 &&
+           e.active->hypothesis->info().id != std::string_view("valve_hysteresis");
+  });
+  const int substeps = with_states ? 4 : 1;
   for (std::size_t k = 0; k < n; ++k) {
     p[0][k] = state[0];
     p[1][k] = state[1];
@@ -575,11 +580,15 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       }
     }
     const double w = moves ? 0.5 * ((*in.velocity)[k] + (*in.velocity)[k + 1]) : 0.0;
-    double v[2], middle[2];
-    rates(u, state, w, v, false);
-    for (int i = 0; i < 2; ++i) middle[i] = state[i] + 0.5 * dt * v[i];
-    rates(u, middle, w, v, !effects.empty());
-    for (int i = 0; i < 2; ++i) state[i] += dt * v[i];
+    // Midpoint rule; states move by half a step before its second half.
+    const double h = dt / substeps;
+    for (int sub = 0; sub < substeps; ++sub) {
+      double v[2], middle[2];
+      rates(u, state, w, v, with_states ? 0.5 * h : 0.0);
+      for (int i = 0; i < 2; ++i) middle[i] = state[i] + 0.5 * h * v[i];
+      rates(u, middle, w, v, with_states ? 0.5 * h : 0.0);
+      for (int i = 0; i < 2; ++i) state[i] += h * v[i];
+    }
   }
 }
 

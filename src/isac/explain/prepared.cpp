@@ -196,6 +196,7 @@ void add_rows(Prepared& data) {
         if (run.usable[k] != 0 && run.time[k] >= skip)
           data.rows.push_back({.run = static_cast<unsigned>(r),
                                .sample = static_cast<unsigned>(k),
+                               .atom = 0,
                                .block = 0,
                                .chain = chain});
     };
@@ -236,12 +237,37 @@ std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_
   return out;
 }
 
+namespace {
+
+/// A wide Gaussian as three running means, whose cost does not grow with its width; its variance is that of the Gaussian to a
+/// part in a hundred.
+std::vector<double> wide_low_pass(std::span<const double> x, double sigma) {
+  const auto n = static_cast<std::ptrdiff_t>(x.size());
+  const auto half = std::max<std::ptrdiff_t>(1, std::lround((std::sqrt(4 * sigma * sigma + 1) - 1) / 2));
+  std::vector<double> now(x.begin(), x.end()), next(x.size());
+  for (int pass = 0; pass < 3; ++pass) {
+    const auto at = [&](std::ptrdiff_t k) {
+      return now[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, n - 1))];
+    };
+    double sum = 0;
+    for (std::ptrdiff_t k = -half; k <= half; ++k) sum += at(k);
+    for (std::ptrdiff_t k = 0; k < n; ++k) {
+      next[static_cast<std::size_t>(k)] = sum / static_cast<double>(2 * half + 1);
+      sum += at(k + half + 1) - at(k - half);
+    }
+    std::swap(now, next);
+  }
+  return now;
+}
+
+}  // namespace
+
 std::vector<double> quieten(std::span<const double> raw, std::span<const double> narrow, double sigma,
                             double wide_sigma, double white) {
-  const std::vector<double> wide = low_pass(raw, wide_sigma);
+  const std::vector<double> wide = wide_low_pass(raw, wide_sigma);
   std::vector<double> difference(raw.size());
   for (std::size_t k = 0; k < raw.size(); ++k) difference[k] = (narrow[k] - wide[k]) * (narrow[k] - wide[k]);
-  const std::vector<double> power = low_pass(difference, 2 * wide_sigma);
+  const std::vector<double> power = wide_low_pass(difference, 2 * wide_sigma);
   // White noise of variance s² has s²/(2 √π σ) of it left after a Gaussian of σ samples.
   const double expected = white * white / (2 * std::sqrt(kPi) * sigma);
   std::vector<double> out(raw.size());
@@ -303,18 +329,28 @@ std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<co
 
 void cut_blocks(Prepared& data, double block_seconds) {
   data.block_seconds = block_seconds;
-  std::size_t block = 0;
+  data.block_of_atom.clear();
+  std::size_t atom = 0, block = 0;
   for (std::size_t r = 0; r + 1 < data.run_begin.size(); ++r) {
+    if (data.run_begin[r + 1] == data.run_begin[r]) continue;
     const double duration = data.runs[r].time.empty() ? 0 : data.runs[r].time.back();
-    const auto count =
-        std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(duration / block_seconds)));
+    const auto count = [&](double seconds) {
+      return std::max<std::size_t>(1, static_cast<std::size_t>(std::lround(duration / seconds)));
+    };
+    const std::size_t atoms = count(kAtomSeconds), blocks = std::min(atoms, count(block_seconds));
     for (std::size_t i = data.run_begin[r]; i < data.run_begin[r + 1]; ++i) {
       const double share = duration > 0 ? data.runs[r].time[data.rows[i].sample] / duration : 0;
-      data.rows[i].block = static_cast<unsigned>(
-          block + std::min(count - 1, static_cast<std::size_t>(share * static_cast<double>(count))));
+      const std::size_t at =
+          std::min(atoms - 1, static_cast<std::size_t>(share * static_cast<double>(atoms)));
+      data.rows[i].atom = static_cast<unsigned>(atom + at);
+      data.rows[i].block = static_cast<unsigned>(block + at * blocks / atoms);
     }
-    if (data.run_begin[r + 1] > data.run_begin[r]) block += count;
+    for (std::size_t at = 0; at < atoms; ++at)
+      data.block_of_atom.push_back(static_cast<unsigned>(block + at * blocks / atoms));
+    atom += atoms;
+    block += blocks;
   }
+  data.atoms = atom;
   data.blocks = block;
 }
 

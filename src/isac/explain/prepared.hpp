@@ -42,6 +42,7 @@ struct BaselineModel {
 
 enum class Chain : unsigned char { kTorque = 0, kPressure1 = 1, kPressure2 = 2, kMotion = 3 };
 inline constexpr int kChains = 4;
+inline constexpr double kAtomSeconds = 2.0;  ///< the shortest block
 
 struct PreparedRun {
   std::string name, experiment, sha256;
@@ -66,7 +67,7 @@ struct PreparedRun {
 
 /// One row of the stacked residual.
 struct Row {
-  unsigned run = 0, sample = 0, block = 0;
+  unsigned run = 0, sample = 0, atom = 0, block = 0;
   Chain chain = Chain::kTorque;
 };
 
@@ -81,7 +82,8 @@ struct Prepared {
   std::vector<PreparedRun> runs;
   std::vector<Row> rows;               ///< by run, then by chain, then by time
   std::vector<std::size_t> run_begin;  ///< rows of run i: [run_begin[i], run_begin[i + 1])
-  std::size_t blocks = 0;
+  std::size_t atoms = 0, blocks = 0;   ///< a block is a number of atoms of one run, one after another
+  std::vector<unsigned> block_of_atom;
   double block_seconds = 0;
   double first_start =
       std::numeric_limits<double>::quiet_NaN();  ///< s since 1970 of the day's first run, where known
@@ -105,7 +107,7 @@ class HeldOut {
 [[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
                                const BaselineModel& baseline, double block_seconds,
                                double first_start = std::numeric_limits<double>::quiet_NaN());
-/// Cuts the rows into blocks anew.
+/// Joins atoms to blocks of about this length anew.
 void cut_blocks(Prepared& data, double block_seconds);
 
 /// A signal low-passed widely where what is lost is noise, narrowly where it moves.

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <random>
 #include <thread>
+#include <tuple>
+#include <utility>
 
 #include "isac/series/statistics.hpp"
 
@@ -141,28 +144,27 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   const Predictor& predictor = *place.predictor;
   const Prepared& data = predictor.data();
   const auto n = static_cast<Eigen::Index>(predictor.rows());
-  const auto blocks = static_cast<Eigen::Index>(data.blocks);
+  const auto atoms = static_cast<Eigen::Index>(data.atoms);
   const Eigen::VectorXd& residual = place.residual;
 
   const auto summarise = [&](Eigen::VectorXd& x, Column& column) {
     column.raw_norm2 = x.squaredNorm();
     x = place.project(x);
-    column.block_score = Eigen::VectorXd::Zero(blocks);
-    column.block_norm = Eigen::VectorXd::Zero(blocks);
+    column.atom_score = Eigen::VectorXd::Zero(atoms);
+    column.atom_norm = Eigen::VectorXd::Zero(atoms);
     for (Eigen::Index i = 0; i < n; ++i) {
-      const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].block);
-      column.block_score[b] -=
+      const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].atom);
+      column.atom_score[b] -=
           x[i] * residual[i];  // prediction − measured: an effect that is missing has the other sign
-      column.block_norm[b] += x[i] * x[i];
+      column.atom_norm[b] += x[i] * x[i];
+      column.chain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] += x[i] * x[i];
     }
-    column.norm2 = column.block_norm.sum();
+    column.norm2 = column.atom_norm.sum();
     if (column.norm2 < 1e-12 * std::max(column.raw_norm2, 1e-300)) {  // all of it is mimicked
-      column.block_score.setZero();
+      column.atom_score.setZero();
       column.norm2 = 0;
     }
-    column.score = column.block_score.sum();
-    const double scatter = column.block_score.norm();
-    column.T = scatter > 0 ? std::abs(column.score) / scatter : 0;
+    column.score = column.atom_score.sum();
   };
 
   std::vector<Task> tasks;
@@ -234,10 +236,18 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       s.hypothesis = tasks[t].hypothesis;
       s.shape = tasks[t].shape;
       s.gain = linear.gain;
+      double all = 0;
+      for (int c = 0; c < kChains; ++c) {
+        for (std::size_t a = 0; a < ways.size(); ++a) {
+          const double amplitude = linear.amplitude[static_cast<Eigen::Index>(a)];
+          s.chain_share[c] += amplitude * amplitude * result.columns[a].chain_norm2[c];
+        }
+        all += s.chain_share[c];
+      }
+      for (double& share : s.chain_share) share = all > 0 ? share / all : 0;
       s.start = null_values(h, shape);
       for (std::size_t a = 0; a < ways.size(); ++a) {
         s.reach = std::max(s.reach, std::sqrt(result.columns[a].norm2));
-        s.T = std::max(s.T, result.columns[a].T);
         for (int i = 0; i < h.info().parameter_count; ++i) {
           const auto k = static_cast<std::size_t>(i);
           const double null = h.info().parameters[i].null_value;
@@ -260,8 +270,22 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   for (std::thread& thread : pool) thread.join();
 
   Screen result;
-  for (Done& d : done)
+  for (Done& d : done) {
     for (Column& c : d.columns) result.columns.push_back(std::move(c));
+    if (d.screened.hypothesis >= 0) result.shapes.push_back(d.screened);
+  }
+  judge(result, data, library, options);
+  return result;
+}
+
+void judge(Screen& result, const Prepared& data, const Library& library, const ScreenOptions& options) {
+  const auto blocks = static_cast<Eigen::Index>(data.blocks);
+  const auto joined = [&](const Eigen::VectorXd& atoms) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(blocks);
+    for (Eigen::Index a = 0; a < atoms.size(); ++a)
+      sum[data.block_of_atom[static_cast<std::size_t>(a)]] += atoms[a];
+    return sum;
+  };
   // Scatter of a score per unit of norm, and how many blocks carry it. A column that few blocks of its chain carry takes the
   // largest scatter that any function of the signals has there: slow noise scatters slow columns most.
   std::vector<double> units;
@@ -278,9 +302,12 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
                              : bit(c.chain);
   };
   for (Column& c : result.columns) {
+    c.T = c.rare_z = 0;
     if (c.norm2 <= 0) continue;
-    c.unit = c.block_score.squaredNorm() / c.norm2;
-    c.carried_by = c.norm2 * c.norm2 / c.block_norm.squaredNorm();
+    const double scatter2 = joined(c.atom_score).squaredNorm();
+    c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
+    c.unit = scatter2 / c.norm2;
+    c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
     if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
     if (c.hypothesis < 0) high[static_cast<int>(c.chain)] = std::max(high[static_cast<int>(c.chain)], c.unit);
   }
@@ -290,7 +317,7 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   std::size_t rare_columns = 0;
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
-    scores.col(static_cast<Eigen::Index>(k)) = c.block_score;
+    scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
     double unit = 0, most = 0;
     for (int chain = 0; chain < kChains; ++chain)
       if ((chains_of(c) & (1U << chain)) != 0) {
@@ -312,21 +339,29 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       std::min(1.0, 2 * upper_tail(rare) * static_cast<double>(std::max<std::size_t>(1, rare_columns)));
 
   // The best shape speaks for a hypothesis.
+  std::map<std::pair<int, int>, std::pair<double, double>>
+      tests;  // largest T and rare score of a shape's columns
+  for (const Column& c : result.columns) {
+    auto& t = tests[{c.hypothesis, c.shape}];
+    t.first = std::max(t.first, c.T);
+    t.second = std::max(t.second, c.rare_z);
+  }
   std::vector<Screened> best(library.hypotheses.size());
-  for (const Done& d : done) {
-    if (d.screened.hypothesis < 0) continue;
-    Screened s = d.screened;
-    for (const Column& c : d.columns) s.rare_z = std::max(s.rare_z, c.rare_z);
+  for (Screened& s : result.shapes) {
+    std::tie(s.T, s.rare_z) = tests[{s.hypothesis, s.shape}];
     Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
-    const double reach = std::max(b.reach, s.reach);
+    const double reach = std::max(b.reach, s.reach), T = std::max(b.T, s.T),
+                 rare_z = std::max(b.rare_z, s.rare_z);
     if (b.hypothesis < 0 || s.gain > b.gain) b = s;
     b.reach = reach;
+    b.T = T;
+    b.rare_z = rare_z;
   }
+  result.candidates.clear();
   for (const Screened& s : best)
     if (s.hypothesis >= 0) result.candidates.push_back(s);
   std::stable_sort(result.candidates.begin(), result.candidates.end(),
                    [](const Screened& a, const Screened& b) { return a.gain > b.gain; });
-  return result;
 }
 
 }  // namespace isac::explain

@@ -26,11 +26,12 @@ namespace isac::explain {
 struct Column {
   int hypothesis = -1;  ///< index in the library, −1 for the generic dictionary
   int shape = 0, amplitude = 0;
-  std::string name;                         ///< of a dictionary column
-  Chain chain = Chain::kTorque;             ///< of a dictionary column
-  Eigen::VectorXd block_score, block_norm;  ///< g_b, Σ x⊥²
-  double score = 0, norm2 = 0;              ///< Σ g_b, Σ x⊥²
-  double raw_norm2 = 0;                     ///< Σ x²: what was there before the projection
+  std::string name;                       ///< of a dictionary column
+  Chain chain = Chain::kTorque;           ///< of a dictionary column
+  Eigen::VectorXd atom_score, atom_norm;  ///< of the shortest blocks: Σ x⊥ r, Σ x⊥²
+  double score = 0, norm2 = 0;            ///< Σ g_b, Σ x⊥²
+  double raw_norm2 = 0;                   ///< Σ x²: what was there before the projection
+  double chain_norm2[kChains] = {};       ///< Σ x⊥² of each chain
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
@@ -43,12 +44,14 @@ struct Screened {
   double gain = 0;    ///< drop of the loss by that linear fit, within the signs that the effect allows
   double T = 0;       ///< largest of its columns
   double rare_z = 0;  ///< largest of its columns' scores against the scatter of blocks elsewhere
+  double chain_share[kChains] = {};  ///< of its response's squares, by chain
   double reach =
       0;  ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
 };
 
 struct Screen {
   std::vector<Screened> candidates;  ///< best shape of each hypothesis, largest gain first
+  std::vector<Screened> shapes;      ///< every shape of every hypothesis
   std::vector<Column> columns;       ///< all, without their rows
   double max_T = 0;
   double p_value = 1;  ///< of the largest T, by flips
@@ -68,6 +71,8 @@ struct ScreenOptions {
 };
 
 [[nodiscard]] Screen screen(const Around& place, const Library& library, const ScreenOptions& options);
+/// The tests once more, after the blocks were cut anew.
+void judge(Screen& screen, const Prepared& data, const Library& library, const ScreenOptions& options);
 
 /// Orthonormal basis of the fitted parameters' sensitivities.
 [[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);

@@ -18,6 +18,7 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
+constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.3;
 
 Floors floors_of(const Prepared& data) {
   Floors floors;
@@ -65,7 +66,7 @@ void reweight(const Predictor& predictor, const Fit& fit, Weights& weights) {
     weights.sigma[1] = weights.sigma[2] = std::max(weights.sigma[1], weights.sigma[2]);
 }
 
-double correlation_seconds(const Prepared& data, const Fit& fit) {
+double correlation_seconds(const Prepared& data, const Eigen::VectorXd& residual) {
   double longest = 0;
   for (const Chain chain : {Chain::kTorque, Chain::kMotion, Chain::kPressure1}) {
     std::vector<std::vector<double>> pieces;
@@ -74,7 +75,7 @@ double correlation_seconds(const Prepared& data, const Fit& fit) {
       if (data.rows[i].chain != chain) continue;
       if (data.rows[i].run != run) pieces.emplace_back();
       run = data.rows[i].run;
-      pieces.back().push_back(fit.residual[static_cast<Eigen::Index>(i)]);
+      pieces.back().push_back(residual[static_cast<Eigen::Index>(i)]);
     }
     if (pieces.empty()) continue;
     const double spacing = data.runs.front().interval * data.stride * (chain == Chain::kPressure1 ? 2 : 1);
@@ -94,27 +95,12 @@ class Search {
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     reweight(predictor_, found_.baseline, found_.weights);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
-    choose_blocks(found_.baseline);
-    for (std::size_t i = 0; i < found_.baseline.tolerances; ++i)
-      say(fmt::format("  tolerance {} = {:.3g}", found_.baseline.model.effects[i].hypothesis->id(),
-                      found_.baseline.model.effects[i].values[0]));
-    for (std::size_t i = 0; i < found_.baseline.model.rest.size(); ++i)
-      if (found_.baseline.model.rest[i] != 0)
-        say(fmt::format("  rest {} = {:.3g}", i, found_.baseline.model.rest[i]));
-    say(fmt::format("baseline fitted: {} rows, {} blocks of {:.1f} s", data_.rows.size(), data_.blocks,
-                    data_.block_seconds));
-    found_.model = found_.baseline;
-    place_ = around(predictor_, found_.model, found_.weights);
-    for (int step = 0; step < options_.most_effects; ++step) {
-      if (!advance()) break;
-    }
-    if (static_cast<int>(found_.added.size()) == options_.most_effects) {
-      Step last;
-      last.screen = screen_of(found_.model);
-      last.gate = gate_of(found_.model, last.screen);
-      found_.adequate = !(last.gate.significant && last.gate.material);
-      found_.steps.push_back(std::move(last));
-    }
+    for (const Row& row : data_.rows) ++rows_[static_cast<int>(row.chain)];
+    choose_blocks(found_.baseline.residual);
+    say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
+    move_to(found_.baseline);
+    forward();
+    if (found_.added.size() > 1) swap_and_drop();
     return std::move(found_);
   }
 
@@ -132,115 +118,81 @@ class Search {
     found_.weights.sigma[1] = found_.weights.sigma[2] = 150.0;  // Pa
   }
 
-  void choose_blocks(const Fit& fit) {
-    const double tau = correlation_seconds(data_, fit);
+  void choose_blocks(const Eigen::VectorXd& residual) {
+    const double tau = correlation_seconds(data_, residual);
     double total = 0, longest = 0;
     for (const PreparedRun& run : data_.runs)
       if (!run.time.empty()) {
         total += run.time.back();
         longest = std::max(longest, run.time.back());
       }
-    double seconds = std::clamp(6 * tau, 2.0, std::max(2.0, longest / 3));
-    seconds = std::max(1.0, std::min(seconds, total / kMinimumBlocks));
+    double seconds = std::clamp(6 * tau, kAtomSeconds, std::max(kAtomSeconds, longest / 3));
+    seconds = std::max(kAtomSeconds, std::min(seconds, total / kMinimumBlocks));
     cut_blocks(data_, seconds);
   }
 
-  Screen screen_of(const Fit& fit) const {
-    (void)fit;
-    return screen(place_, library_,
-                  {.flips = 1999,
-                   .significance = 0.5 * options_.significance,
-                   .seed = options_.seed,
-                   .threads = options_.threads,
-                   .dictionary = true});
+  ScreenOptions screen_options() const {
+    return {.flips = 1999,
+            .significance = 0.5 * options_.significance,
+            .seed = options_.seed,
+            .threads = options_.threads,
+            .dictionary = true};
   }
 
-  /// Size of the largest single response that the data asks for, over the floor of its chain.
-  Gate gate_of(const Fit& fit, const Screen& s) const {
+  void move_to(const Fit& fit) {
+    found_.model = fit;
+    place_ = around(predictor_, found_.model, found_.weights);
+  }
+
+  /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
+  /// candidate leaves over.
+  Screen screen_here() {
+    choose_blocks(place_.residual);
+    Screen s = screen(place_, library_, screen_options());
+    const double before = data_.block_seconds;
+    for (const Screened& c : s.candidates) {
+      if (c.gain <= 0) break;
+      const std::vector<Trial> best = refit_all({c});
+      choose_blocks(best.front().residual);
+      break;
+    }
+    if (data_.block_seconds < before) {
+      judge(s, data_, library_, screen_options());
+    } else if (data_.block_seconds > before) {
+      cut_blocks(data_, before);
+    }
+    return s;
+  }
+
+  /// Size of the largest response that is significant, over the floor of its chain.
+  Gate gate_of(const Screen& s) const {
     Gate gate;
     gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
     gate.significant = gate.p_value <= options_.significance;
-    for (const Screened& c : s.candidates) {
-      if (c.gain <= 0) break;
-      if (!significant(c, s)) continue;
-      Chain chain{};
-      const double size =
-          size_of_gain(c.gain, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains, &chain);
-      if (size > gate.size) {
+    const auto consider = [&](double gain, const double* share) {
+      for (int c = 0; c < kChains; ++c) {
+        if (rows_[c] == 0 || share[c] <= 0) continue;
+        const double size = std::sqrt(gain * share[c] / static_cast<double>(rows_[c])) *
+                            found_.weights.sigma[c] / floor_of(c);
+        if (size <= gate.size) continue;
         gate.size = size;
-        gate.chain = chain;
+        gate.chain = static_cast<Chain>(c);
       }
-    }
-    if (std::getenv("ISAC_EXPLAIN_DEBUG") != nullptr) {
-      for (std::size_t r = 0; r < data_.runs.size(); ++r) {
-        double sum[kChains] = {}, count[kChains] = {};
-        for (std::size_t i = data_.run_begin[r]; i < data_.run_begin[r + 1]; ++i) {
-          const auto c = static_cast<std::size_t>(data_.rows[i].chain);
-          sum[c] += fit.residual[static_cast<Eigen::Index>(i)] * fit.residual[static_cast<Eigen::Index>(i)];
-          ++count[c];
-        }
-        say(fmt::format("    run {} {} day {:.0f}: {:.2f} {:.2f} {:.2f} {:.2f}", data_.runs[r].name,
-                        data_.runs[r].experiment, data_.runs[r].day_offset, std::sqrt(sum[0] / count[0]),
-                        std::sqrt(sum[1] / count[1]), std::sqrt(sum[2] / count[2]),
-                        std::sqrt(sum[3] / count[3])));
-      }
-      std::vector<const Column*> order;
-      for (const Column& c : s.columns) order.push_back(&c);
-      std::sort(order.begin(), order.end(),
-                [](const Column* a, const Column* b) { return a->rare_z > b->rare_z; });
-      for (std::size_t i = 0; i < 6 && i < order.size(); ++i)
-        say(fmt::format("    rare {:.1f} T {:.1f} unit {:.2f} {} {}", order[i]->rare_z, order[i]->T,
-                        order[i]->unit, order[i]->name,
-                        order[i]->hypothesis >= 0
-                            ? library_.hypotheses[static_cast<std::size_t>(order[i]->hypothesis)].id()
-                            : ""));
-      std::sort(order.begin(), order.end(), [](const Column* a, const Column* b) { return a->T > b->T; });
-      for (std::size_t i = 0; i < 6 && i < order.size(); ++i)
-        say(fmt::format("    T {:.1f} rare {:.1f} unit {:.2f} {} {}", order[i]->T, order[i]->rare_z,
-                        order[i]->unit, order[i]->name,
-                        order[i]->hypothesis >= 0
-                            ? library_.hypotheses[static_cast<std::size_t>(order[i]->hypothesis)].id()
-                            : ""));
-      say(fmt::format("    p flips {:.4g} rare {:.4g} maxT {:.2f}", s.p_value, s.rare_p, s.max_T));
-    }
+    };
+    for (const Screened& c : s.candidates)
+      if (c.gain > 0 && significant(c, s)) consider(c.gain, c.chain_share);
     for (const Column& c : s.columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
-      const double gain = c.score * c.score / c.norm2;
-      const unsigned chains = c.name.starts_with("torque")   ? bit(Chain::kTorque)
-                              : c.name.starts_with("motion") ? bit(Chain::kMotion)
-                                                             : kPressureChains;
-      Chain chain{};
-      const double size = size_of_gain(gain, chains, &chain);
-      if (size > gate.size) {
-        gate.size = size;
-        gate.chain = chain;
-      }
+      double share[kChains] = {};
+      share[static_cast<int>(c.chain)] = 1;
+      consider(c.score * c.score / c.norm2, share);
     }
-    (void)fit;
     gate.material = gate.size >= options_.material;
     return gate;
   }
 
   static bool significant(const Screened& c, const Screen& s) {
     return c.T >= s.limit || c.rare_z >= s.rare_limit;
-  }
-
-  /// If all of a gain came from one chain: its rms over the floor; the chain with most rows of those that may be.
-  double size_of_gain(double gain, unsigned chains, Chain* where) const {
-    double best = 0;
-    for (int c = 0; c < kChains; ++c) {
-      if ((chains & (1U << c)) == 0) continue;
-      std::size_t rows = 0;
-      for (const Row& row : data_.rows) rows += static_cast<int>(row.chain) == c ? 1U : 0U;
-      if (rows == 0) continue;
-      const double floor = floor_of(c);
-      const double size = std::sqrt(gain / static_cast<double>(rows)) * found_.weights.sigma[c] / floor;
-      if (best == 0 || size < best) {
-        best = size;
-        *where = static_cast<Chain>(c);
-      }
-    }
-    return best;
   }
 
   double floor_of(int chain) const {
@@ -342,51 +294,134 @@ class Search {
     for (Trial& t : trials) t.weight /= sum;
   }
 
-  bool advance() {
-    Step step;
-    step.screen = screen_of(found_.model);
-    step.gate = gate_of(found_.model, step.screen);
-    if (found_.added.empty()) found_.gate = step.gate;
-    if (!step.gate.significant || !step.gate.material) {
-      say(fmt::format("nothing {} is left (p = {:.3g}, size {:.2f} of the noise floor)",
-                      step.gate.significant ? "material" : "significant", step.gate.p_value, step.gate.size));
-      found_.adequate = true;
-      found_.steps.push_back(std::move(step));
-      return false;
-    }
-    const std::vector<Screened> list = shortlist(step.screen);
-    std::string names;
-    for (const Screened& c : list)
-      names += (names.empty() ? "" : ", ") + library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id();
-    say(fmt::format("something is missing (p = {:.3g}, {:.2f} of the noise floor); refitting {}",
-                    step.gate.p_value, step.gate.size, names));
-    step.trials = refit_all(list);
-    rank(step.trials, step.screen.noise_unit);
-    for (const Trial& t : step.trials) {
-      const Trial& best = step.trials.front();
+  void report(const std::vector<Trial>& trials, double unit) {
+    for (const Trial& t : trials) {
+      const Trial& best = trials.front();
       const std::string sentence =
-          &t == &best ? fmt::format("closes {:.0f} units of noise",
-                                    (place_.residual.squaredNorm() - t.loss) / step.screen.noise_unit)
-          : t.in_set  ? fmt::format("cannot be told from {} ({:.1f} sigma of data between them)", id_of(best),
-                                    t.behind.separation)
-                      : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, id_of(best));
+          &t == &best ? fmt::format("fits best; closes {:.0f} units of noise, {:.2f} of the floor",
+                                    (place_.residual.squaredNorm() - t.loss) / unit, t.material)
+          : t.in_set
+              ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
+                            id_of(best), t.behind.t, t.behind.separation)
+              : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, id_of(best));
       found_.notes.push_back({id_of(t), sentence});
       say(id_of(t) + ": " + sentence);
     }
-    if (step.trials.empty() || step.trials.front().material < options_.material) {
-      found_.adequate = false;
-      found_.steps.push_back(std::move(step));
-      return false;
+  }
+
+  Step step_here() {
+    Step step;
+    step.screen = screen_here();
+    step.gate = gate_of(step.screen);
+    if (!step.gate.significant || !step.gate.material) return step;
+    step.trials = refit_all(shortlist(step.screen));
+    std::erase_if(step.trials, [&](const Trial& t) { return is_unphysical(t); });
+    rank(step.trials, step.screen.noise_unit);
+    return step;
+  }
+
+  /// An amplitude at the end of its plausible range closes a gap for the wrong reason.
+  bool is_unphysical(const Trial& t) {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+    for (int i = 0; i < h.info().parameter_count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double null = h.info().parameters[i].null_value, margin = 1e-6 * (h.upper[k] - h.lower[k]);
+      if (!h.free[k] || !h.amplitude[k]) continue;
+      const bool at_end = (t.values[k] <= h.lower[k] + margin && h.lower[k] != null) ||
+                          (t.values[k] >= h.upper[k] - margin && h.upper[k] != null);
+      if (!at_end) continue;
+      const std::string sentence =
+          fmt::format("ruled out: needs {} at the end of its plausible range", h.info().parameters[i].name);
+      found_.notes.push_back({h.id(), sentence});
+      say(h.id() + ": " + sentence);
+      return true;
     }
-    const Trial& best = step.trials.front();
-    found_.added.push_back(best.hypothesis);
-    Active active;
-    active.hypothesis = &library_.hypotheses[static_cast<std::size_t>(best.hypothesis)];
-    active.values = best.values;
-    found_.model = refit(predictor_, found_.model, {active}, found_.weights, 6);
-    place_ = around(predictor_, found_.model, found_.weights);
-    found_.steps.push_back(std::move(step));
-    return true;
+    return false;
+  }
+
+  Active active_of(const Trial& t) const {
+    Active a;
+    a.hypothesis = &library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+    a.values = t.values;
+    return a;
+  }
+
+  void forward() {
+    double first_size = 0;
+    for (;;) {
+      Step step = step_here();
+      if (found_.steps.empty()) found_.gate = step.gate;
+      const bool open = step.gate.significant && step.gate.material;
+      say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor ({} blocks of {:.1f} s)",
+                             found_.added.empty() ? "something" : "something more", step.gate.p_value,
+                             step.gate.size, data_.blocks, data_.block_seconds)
+               : fmt::format("nothing {} is left: p = {:.2g}, {:.2f} of the noise floor",
+                             step.gate.significant ? "material" : "significant", step.gate.p_value,
+                             step.gate.size));
+      report(step.trials, step.screen.noise_unit);
+      found_.adequate = !open;
+      bool take =
+          open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
+      if (take) {
+        const double size = step.trials.front().material;
+        take = size >= options_.material;
+        // What is left over after a good name is small; a remainder that needs another name must be as clear as the first,
+        // or the first was only like the truth.
+        if (take && !found_.added.empty())
+          take = size >= kSecondOfFirst * first_size && size >= kSecondOfFloor;
+        if (take && found_.added.empty()) first_size = size;
+      }
+      found_.steps.push_back(std::move(step));
+      if (!take) return;
+      const Trial& best = found_.steps.back().trials.front();
+      found_.added.push_back(best.hypothesis);
+      move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
+    }
+  }
+
+  Fit with(const std::vector<Trial>& effects) const {
+    std::vector<Active> active;
+    for (const Trial& t : effects) active.push_back(active_of(t));
+    return active.empty() ? found_.baseline : refit(predictor_, found_.baseline, active, found_.weights, 6);
+  }
+
+  /// Each effect is given up once, with the others in place: another may do better, or nothing may be missed.
+  void swap_and_drop() {
+    std::vector<Trial> chosen;
+    for (std::size_t i = 0; i < found_.added.size(); ++i) chosen.push_back(found_.steps[i].trials.front());
+    Step last = std::move(found_.steps.back());
+    std::vector<Step> steps;
+    bool changed = false;
+    for (std::size_t i = 0; i < chosen.size();) {
+      std::vector<Trial> others = chosen;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      found_.added.clear();
+      for (const Trial& t : others) found_.added.push_back(t.hypothesis);
+      move_to(with(others));
+      Step step = step_here();
+      if (step.trials.empty()) {
+        say(fmt::format("{} is not missed when it is dropped", id_of(chosen[i])));
+        chosen = others;
+        changed = true;
+        continue;
+      }
+      if (id_of(step.trials.front()) != id_of(chosen[i])) {
+        say(fmt::format("{} does better in place of {}", id_of(step.trials.front()), id_of(chosen[i])));
+        changed = true;
+      }
+      chosen[i] = step.trials.front();
+      steps.push_back(std::move(step));
+      ++i;
+    }
+    found_.added.clear();
+    for (const Trial& t : chosen) found_.added.push_back(t.hypothesis);
+    move_to(with(chosen));
+    if (changed) {
+      last = step_here();
+      found_.adequate = !(last.gate.significant && last.gate.material);
+    }
+    steps.push_back(std::move(last));
+    found_.steps = std::move(steps);
   }
 
   const Predictor& predictor_;
@@ -395,6 +430,7 @@ class Search {
   const ExplainOptions& options_;
   Found found_;
   Around place_;  ///< of found_.model
+  std::size_t rows_[kChains] = {};
 };
 
 }  // namespace

@@ -1,0 +1,445 @@
+#include "isac/explain/experiment_runs.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/core/error.hpp"
+#include "isac/core/units.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kSlowTone = 0.62, kSlowShare = 0.08;  // of a hand, which never repeats itself exactly
+constexpr double kSteepest = (1 - kSlowShare) + kSlowShare * kSlowTone;
+constexpr int kSubsteps = 8;                 // of the free joint per sample
+constexpr double kOfAngleLimit = 0.9;        // a free joint stays this far inside
+constexpr double kSettling = 0.4;            // s, as in the recordings: rows of the pressure begin here
+constexpr double kLeastPressure = 29419.95;  // Pa, 0.3 kg/cm2: below it muscles hang loose
+
+/// The torque of a model at one instant, from all that the joint feels.
+class Torque {
+ public:
+  Torque(const Predictor& predictor, const ModelPoint& model) : model_(model) {
+    const RigFacts& rig = predictor.data().rig;
+    point_.wheel_radius = rig.wheel_radius;
+    point_.reference_pressure = rig.initial_pressure;
+    for (std::size_t j = 0; j < predictor.base().size(); ++j) {
+      const int e = models::find_effect(predictor.base()[j].name);
+      if (e < 0) continue;
+      terms_.push_back({e, model.base[j]});
+      if (predictor.base()[j].name == "A") point_.stiffness = model.base[j];
+      if (predictor.base()[j].name == "B") point_.pressure_gain = model.base[j];
+    }
+    for (const Active& a : model.effects) {
+      const models::EffectInfo& info = a.hypothesis->info();
+      if (info.hook == models::Hook::kTorque && info.state_count < 2) states_.push_back({&a, 0.0});
+    }
+  }
+
+  void move_to(double angle, double velocity, double p1, double p2, double time) {
+    point_.angle = angle;
+    point_.velocity = velocity;
+    point_.delta_pressure = 0.5 * (p2 - p1);
+    point_.mean_pressure = 0.5 * (p1 + p2);
+    point_.time = time;
+  }
+  void rest() {
+    for (State& s : states_)
+      models::effect_rest(s.active->hypothesis->effect, s.active->values.data(), point_, &s.z);
+  }
+  void step(double dt) {
+    for (State& s : states_) {
+      double rate = 0;
+      models::effect_derivative(s.active->hypothesis->effect, s.active->values.data(), point_, &s.z, &rate);
+      s.z += dt * rate;
+    }
+  }
+  /// At the velocity given instead of the point's.
+  [[nodiscard]] double at(double velocity) const {
+    models::JointPoint<double> x = point_;
+    x.velocity = velocity;
+    double sum = baseline(velocity);
+    for (const State& s : states_)
+      sum += models::effect_torque(s.active->hypothesis->effect, s.active->values.data(), x, &s.z);
+    return sum;
+  }
+  [[nodiscard]] double baseline(double velocity) const {
+    models::JointPoint<double> x = point_;
+    x.velocity = velocity;
+    double sum = 0;
+    for (const auto& [effect, value] : terms_) sum += models::effect_torque(effect, &value, x);
+    return sum;
+  }
+  /// φ at which the baseline's torque is nothing.
+  [[nodiscard]] double resting_angle(double p1, double p2) {
+    move_to(0, 0, p1, p2, 0);
+    const double here = baseline(0);
+    const double stiffness = point_.stiffness * point_.wheel_radius * point_.wheel_radius;
+    return stiffness < 0 ? -here / stiffness : 0.0;
+  }
+
+ private:
+  struct State {
+    const Active* active;
+    double z;
+  };
+  const ModelPoint& model_;
+  models::JointPoint<double> point_;
+  std::vector<std::pair<int, double>> terms_;
+  std::vector<State> states_;
+};
+
+double base_value(const Predictor& predictor, const ModelPoint& model, const char* name, double otherwise) {
+  for (std::size_t j = 0; j < predictor.base().size(); ++j)
+    if (predictor.base()[j].name == name) return model.base[j];
+  return otherwise;
+}
+
+/// Motion of the free joint: symplectic Euler; where neither direction's torque leads away, dry friction holds it.
+bool move_freely(const RigFacts& rig, Torque& torque, double angle_limit, PreparedRun& run) {
+  constexpr double kCreeping = 1e-9;  // rad/s: on which side of rest
+  const std::size_t n = run.time.size();
+  const double dt = run.interval / kSubsteps;
+  const auto& p = run.raw_pressure;
+  double angle = torque.resting_angle(p[0][0], p[1][0]), velocity = 0;
+  torque.move_to(angle, 0, p[0][0], p[1][0], 0);
+  torque.rest();
+  for (std::size_t k = 0; k < n; ++k) {
+    run.angle[k] = angle;
+    run.velocity[k] = velocity;
+    torque.move_to(angle, velocity, p[0][k], p[1][k], run.time[k]);
+    const double up = torque.at(kCreeping), down = torque.at(-kCreeping);
+    const bool held = velocity == 0 && up <= 0 && down >= 0;
+    run.acceleration[k] = held            ? 0.0
+                          : velocity == 0 ? (up > 0 ? up : down) / rig.inertia
+                                          : torque.at(velocity) / rig.inertia;
+    if (!(std::abs(angle) < angle_limit)) return false;
+    for (int i = 0; i < kSubsteps; ++i) {
+      torque.move_to(angle, velocity, p[0][k], p[1][k], run.time[k] + i * dt);
+      double push = 0;
+      if (velocity == 0) {
+        const double forward = torque.at(kCreeping), back = torque.at(-kCreeping);
+        push = forward > 0 ? forward : (back < 0 ? back : 0.0);
+      } else {
+        push = torque.at(velocity);
+      }
+      const double next = velocity + dt * push / rig.inertia;
+      velocity = velocity * next < 0 ? 0.0 : next;
+      angle += dt * velocity;
+      torque.step(dt);
+    }
+  }
+  return true;
+}
+
+void move_by_hand(const PlannedRun& planned, double middle, PreparedRun& run) {
+  const double a = planned.amplitude_rad, rate = planned.peak_speed_rad_s / (kSteepest * a);
+  for (std::size_t k = 0; k < run.time.size(); ++k) {
+    const double t = rate * run.time[k], s = kSlowTone * t;
+    run.angle[k] = middle + a * ((1 - kSlowShare) * std::sin(t) + kSlowShare * std::sin(s));
+    run.velocity[k] = a * rate * ((1 - kSlowShare) * std::cos(t) + kSlowShare * kSlowTone * std::cos(s));
+    run.acceleration[k] = -a * rate * rate *
+                          ((1 - kSlowShare) * std::sin(t) + kSlowShare * kSlowTone * kSlowTone * std::sin(s));
+  }
+}
+
+void press(const series::Program& program, double gain, double lag, PreparedRun& run) {
+  const std::size_t n = run.time.size();
+  const double keep = std::exp(-run.interval / lag);
+  for (int i = 0; i < 2; ++i) {
+    run.command[i].resize(n);
+    run.raw_pressure[i].resize(n);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    const series::Pressures u = program.at(run.time[k]);
+    run.command[0][k] = u.p1;
+    run.command[1][k] = u.p2;
+  }
+  for (int i = 0; i < 2; ++i) {
+    double p = gain * run.command[i][0];
+    for (std::size_t k = 0; k < n; ++k) {
+      run.raw_pressure[i][k] = p;
+      p = gain * run.command[i][k] + keep * (p - gain * run.command[i][k]);
+    }
+    run.smooth_pressure[i] = run.pressure[i] = run.raw_pressure[i];
+  }
+}
+
+/// Forces that the sensors would read; false if they cannot.
+bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run) {
+  const std::size_t n = run.time.size();
+  for (auto& force : run.force) force.resize(n);
+  double largest = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double p1 = run.raw_pressure[0][k], p2 = run.raw_pressure[1][k];
+    torque.move_to(run.angle[k], run.velocity[k], p1, p2, run.time[k]);
+    const double half = 0.5 * torque.baseline(run.velocity[k]) / radius,
+                 common = range.common_force * 0.5 * (p1 + p2);
+    run.force[0][k] = common - half;
+    run.force[1][k] = common + half;
+    largest = std::max(largest, common + std::abs(half));
+  }
+  return largest <= range.force_limit;
+}
+
+void add_rows(Prepared& data, const RigRange& range) {
+  const PreparedRun& run = data.runs.front();
+  const auto put = [&](Chain chain, double from, std::size_t step) {
+    for (std::size_t k = 0; k < run.time.size(); k += step)
+      if (run.time[k] >= from)
+        data.rows.push_back({.run = 0, .sample = static_cast<unsigned>(k), .block = 0, .chain = chain});
+  };
+  const auto stride = static_cast<std::size_t>(data.stride);
+  if (run.has_torque && (!run.is_free || range.free_torque)) put(Chain::kTorque, 0, stride);
+  if (run.has_command) {
+    put(Chain::kPressure1, kSettling, 2 * stride);
+    put(Chain::kPressure2, kSettling, 2 * stride);
+  }
+  if (run.is_free) put(Chain::kMotion, 0, stride);
+  data.run_begin = {0, data.rows.size()};
+  data.blocks = 1;
+}
+
+}  // namespace
+
+RigRange range_of(const Predictor& predictor, const series::ExcitationOptions& limits) {
+  const Prepared& data = predictor.data();
+  RigRange range;
+  range.limits = limits;
+  double farthest = 0, fastest = 0, force = 0, force_sum = 0, pressure_sum = 0;
+  bool driven = false, motion = false;
+  for (const PreparedRun& run : data.runs) {
+    driven = driven || (run.has_torque && run.has_pressure && !run.is_free);
+    for (std::size_t k = 0; k < run.angle.size(); ++k) {
+      farthest = std::max(farthest, std::abs(run.angle[k]));
+      fastest = std::max(fastest, std::abs(run.velocity[k]));
+    }
+    if (!run.time.empty()) range.day_offset = std::max(range.day_offset, run.day_offset + run.time.back());
+    if (run.interval > 0) range.row_spacing = run.interval * data.stride;
+    if (run.force[0].empty() || !run.has_pressure) continue;
+    for (std::size_t k = 0; k < run.time.size(); ++k) {
+      force = std::max({force, run.force[0][k], run.force[1][k]});
+      force_sum += run.force[0][k] + run.force[1][k];
+      pressure_sum += run.raw_pressure[0][k] + run.raw_pressure[1][k];
+    }
+  }
+  for (const Row& row : data.rows) {
+    range.valves = range.valves || row.chain == Chain::kPressure1;
+    motion = motion || row.chain == Chain::kMotion;
+    range.free_torque = range.free_torque || (row.chain == Chain::kTorque && data.runs[row.run].is_free);
+  }
+  range.free_torque = range.free_torque || !driven;
+  range.day_offset += 60;
+  range.moves_freely = std::isfinite(data.rig.inertia) && data.rig.inertia > 0;
+  range.angle = std::clamp(1.1 * farthest, 0.25, kOfAngleLimit * limits.angle_limit);
+  range.speed = std::clamp(1.1 * fastest, 2.0, limits.speed_limit);
+  if (pressure_sum > 0) range.common_force = force_sum / pressure_sum;
+  range.force_limit = std::max(limits.force_limit, force);
+  if (!motion && range.moves_freely && std::isfinite(data.rig.angle_step)) {
+    // White noise of deviation s leaves s √(3/(8 √π)) σ^−5/2 √Δt of itself in a second derivative by a Gaussian of σ.
+    const double white = data.rig.angle_step / std::sqrt(12.0);
+    range.free_row_noise = data.rig.inertia * white * std::sqrt(3 / (8 * std::sqrt(kPi))) *
+                           std::pow(data.smoothing.motion, -2.5) * std::sqrt(range.row_spacing / data.stride);
+  }
+  return range;
+}
+
+std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& rig) {
+  constexpr double kPlain = 20, kLong = 60;  // s
+  const double p0 = rig.initial_pressure / kPascalPerKgfCm2, far = 0.85 * range.angle;
+  std::vector<PlannedRun> runs;
+  const auto add = [&](PlannedRun run) {
+    run.seconds = std::max(run.seconds, std::min(kLong, least_seconds(run)));
+    runs.push_back(run);
+  };
+  const double levels[] = {0.55 * p0, 0.75 * p0, p0, 1.2 * p0, 1.4 * p0};
+  // By hand, at constant pressures and with the mean pressure moving.
+  const double speeds[] = {0.04, 0.15, 0.5, 1.5, 0.9 * range.speed};
+  for (const double mean : levels)
+    for (const double speed : speeds)
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = mean,
+           .amplitude_rad = far,
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.03, 0.1, 0.4, 1.5})
+    for (const double part : {0.1, 0.35})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = part * far,
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.15, 0.6, 0.8 * range.speed})
+    for (const double difference : {-1.2, -0.6, 0.6, 1.2})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .delta_pressure_kgcm2 = difference,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = 0.6 * far,
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.15, 0.6, 0.8 * range.speed})
+    for (const char* waveform : {"triangle", "steps"})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = far,
+           .peak_speed_rad_s = speed,
+           .pressure_swing_kgcm2 = 0.35 * p0,
+           .pressure_period_s = 10,
+           .waveform = waveform});
+  // Clamped: Δp about nothing.
+  struct Wave {
+    const char* waveform;
+    double period;
+  };
+  for (const double at : {-0.9, -0.45, 0.0, 0.45, 0.9})
+    for (const Wave wave : {Wave{"triangle", 8}, Wave{"steps", 4}, Wave{"sine", 1}, Wave{"sine", 0.25}})
+      for (const double swing : {0.4, 1.5}) {
+        if (swing < 1 && at != 0) continue;
+        add({.experiment = "constant-angle",
+             .seconds = kPlain,
+             .mean_pressure_kgcm2 = p0,
+             .middle_rad = at * far,
+             .pressure_swing_kgcm2 = swing,
+             .pressure_period_s = wave.period,
+             .waveform = wave.waveform});
+      }
+  for (const double mean : {0.6 * p0, 1.3 * p0})
+    for (const double at : {-0.6, 0.6})
+      add({.experiment = "constant-angle",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = mean,
+           .middle_rad = at * far,
+           .pressure_swing_kgcm2 = 0.4 * p0,
+           .pressure_period_s = 8,
+           .waveform = "triangle"});
+  // Free: decay after steps, broadband, tones.
+  if (range.moves_freely)
+    for (const double mean : {0.7 * p0, p0, 1.25 * p0})
+      for (const double swing : {0.25, 0.8})
+        for (const Wave wave : {Wave{"steps", 5}, Wave{"steps", 1.2}, Wave{"triangle", 8}, Wave{"sine", 2},
+                                Wave{"sine", 0.7}, Wave{"sine", 0.25}})
+          add({.experiment = "free",
+               .seconds = kPlain,
+               .mean_pressure_kgcm2 = mean,
+               .pressure_swing_kgcm2 = swing,
+               .pressure_period_s = wave.period,
+               .waveform = wave.waveform});
+  // The valve unit, both muscles together.
+  if (range.valves)
+    for (const double mean : {0.7 * p0, 1.1 * p0})
+      for (const double swing : {0.05, 0.25, 1.0, 1.7})
+        for (const Wave wave : {Wave{"steps", 4}, Wave{"steps", 0.6}, Wave{"triangle", 10}, Wave{"sine", 0.5},
+                                Wave{"sine", 0.15}})
+          add({.experiment = "pcu-step",
+               .seconds = kPlain,
+               .mean_pressure_kgcm2 = mean,
+               .pressure_swing_kgcm2 = swing,
+               .pressure_period_s = wave.period,
+               .waveform = wave.waveform});
+  // Long holds, for what is slow.
+  for (const char* experiment : {"constant-angle", "free", "constant-pressure"}) {
+    if (std::string_view(experiment) == "free" && !range.moves_freely) continue;
+    for (const double period : {30.0, 80.0})
+      add({.experiment = experiment,
+           .seconds = kLong,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = far,
+           .middle_rad = std::string_view(experiment) == "constant-angle" ? 0.5 * far : kNotKnown,
+           .peak_speed_rad_s = 0.4,
+           .pressure_swing_kgcm2 = 0.8,
+           .pressure_period_s = period,
+           .waveform = "steps"});
+  }
+  return runs;
+}
+
+double least_seconds(const PlannedRun& run) {
+  double period = 0;
+  if (run.pressure_swing_kgcm2 > 0 && run.waveform != "hold") period = run.pressure_period_s;
+  if (run.experiment == "constant-pressure")
+    period = std::max(period, 2 * kPi * kSteepest * run.amplitude_rad / run.peak_speed_rad_s);
+  return std::max(10.0, 5 * std::ceil(0.2 * period));
+}
+
+series::PlanRun plan_run(const PlannedRun& run) {
+  return {.experiment = run.experiment,
+          .duration = run.seconds,
+          .delta_pressure = run.delta_pressure_kgcm2 * kPascalPerKgfCm2,
+          .mean_pressure = run.mean_pressure_kgcm2 * kPascalPerKgfCm2,
+          .amplitude = run.amplitude_rad,
+          .middle = run.middle_rad,
+          .peak_speed = run.peak_speed_rad_s,
+          .pressure_swing = run.pressure_swing_kgcm2 * kPascalPerKgfCm2,
+          .pressure_period = run.pressure_period_s,
+          .waveform = run.waveform};
+}
+
+std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint& model,
+                                     const RigRange& range, const PlannedRun& planned) {
+  const Prepared& before = recorded.data();
+  const double speed = planned.experiment == "constant-pressure" ? planned.peak_speed_rad_s : 0.0;
+  if (!(speed <= range.speed)) return std::nullopt;
+  series::Program program;
+  try {
+    program = series::plan_programs({.runs = {plan_run(planned)}}, range.limits, 1).front();
+  } catch (const Error&) {  // isac-log would refuse it
+    return std::nullopt;
+  }
+  for (const series::Knot& knot : program.knots)
+    if (std::min(knot.p1, knot.p2) < kLeastPressure) return std::nullopt;
+
+  Prepared data;
+  data.rig = before.rig;
+  data.baseline = before.baseline;
+  data.smoothing = before.smoothing;
+  data.first_start = before.first_start;
+  // Half the row's spacing is enough for what the kernel leaves.
+  data.stride = 2;
+  PreparedRun run;
+  run.name = "planned";
+  run.experiment = planned.experiment;
+  run.interval = 0.5 * range.row_spacing;
+  run.day_offset = range.day_offset;
+  run.is_free = planned.experiment == "free";
+  run.has_torque = run.has_pressure = true;
+  run.has_command = range.valves;
+  const auto n = static_cast<std::size_t>(planned.seconds / run.interval + 1);
+  run.time.resize(n);
+  for (std::size_t k = 0; k < n; ++k) run.time[k] = static_cast<double>(k) * run.interval;
+  run.usable.assign(n, 1);
+  press(program, base_value(recorded, model, "K_C", 1.0), base_value(recorded, model, "T_C", 0.17), run);
+
+  Torque torque(recorded, model);
+  run.angle.assign(n, 0.0);
+  run.velocity.assign(n, 0.0);
+  run.acceleration.assign(n, 0.0);
+  if (run.is_free) {
+    if (!range.moves_freely ||
+        !move_freely(before.rig, torque, kOfAngleLimit * range.limits.angle_limit, run))
+      return std::nullopt;
+  } else if (planned.experiment == "constant-pressure") {
+    const double middle = std::isfinite(planned.middle_rad)
+                              ? planned.middle_rad
+                              : torque.resting_angle(run.raw_pressure[0][0], run.raw_pressure[1][0]);
+    if (std::abs(middle) + planned.amplitude_rad > range.angle * 1.2) return std::nullopt;
+    move_by_hand(planned, middle, run);
+  } else {
+    run.angle.assign(
+        n, planned.experiment == "pcu-step" || !std::isfinite(planned.middle_rad) ? 0.0 : planned.middle_rad);
+  }
+  if (range.common_force > 0 && !pull(range, torque, before.rig.wheel_radius, run)) return std::nullopt;
+  run.raw_angle = run.angle;
+  run.dry_velocity = dry_velocity(run.raw_angle, run.velocity, run.interval, before.rig.angle_step);
+  run.slow_acceleration = run.acceleration;
+  run.torque.assign(n, 0.0);
+  run.smooth_torque = run.slow_torque = run.torque;
+  data.runs.push_back(std::move(run));
+  add_rows(data, range);
+  return data;
+}
+
+}  // namespace isac::explain
