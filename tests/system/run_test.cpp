@@ -82,10 +82,10 @@ bool valves_are_open(const std::string& log) {
 }
 
 /// Runs at the wall clock's pace and takes a minute, unless something ends it.
-std::vector<std::string> long_run(const ScratchFolder& folder) {
+std::vector<std::string> long_run(const ScratchFolder& folder, const char* heartbeat = "20 s") {
   return {"position", "--sine", "0.1 rad",          "--card", "sim:",
           "--pace",   "real",   "--duration",       "60 s",   "--heartbeat",
-          "1 s",      "-o",     folder / "run.csv", "--json", folder / "run.json"};
+          heartbeat,  "-o",     folder / "run.csv", "--json", folder / "run.json"};
 }
 
 TEST(IsacRun, step_arrives) {
@@ -240,7 +240,7 @@ TEST(IsacRun, waits_for_a_person_to_permit_the_arming) {
   const auto log = read_recording(folder / "alone.csv");
   for (const double state : log.column("state").values) ASSERT_EQ(state, 0.0);
   const std::string call = "(sleep 0.3; echo) | " ISAC_BIN_DIR
-                           "/isac-run hand --ask --pace real --heartbeat '1 s' --duration '0.1 s' --json " +
+                           "/isac-run hand --ask --pace real --heartbeat '20 s' --duration '0.1 s' --json " +
                            (folder / "run.json") + " > /dev/null";
   EXPECT_EQ(std::system(call.c_str()), 0);
   EXPECT_EQ(answer_of(folder / "run.json")["ended"], "done");
@@ -267,7 +267,7 @@ TEST(IsacRun, killed_loop_is_vented_by_the_supervisor_and_its_last_cycles_are_ke
 
 TEST(IsacRun, hung_loop_is_vented_by_the_supervisor) {
   const ScratchFolder folder;
-  Background program(long_run(folder), folder / "out");
+  Background program(long_run(folder, "2 s"), folder / "out");
   ASSERT_TRUE(valves_are_open(folder / "run.csv")) << read_text(folder / "out");
   kill(program.loop(), SIGSTOP);
   EXPECT_EQ(program.wait(), 4) << read_text(folder / "out");
@@ -381,7 +381,7 @@ TEST(IsacRun, runs_degraded_without_permission_and_says_so_or_refuses_when_asked
         "cd " + folder.path().string() +
         " && setpriv --reuid=65534 --regid=65534 --clear-groups --bounding-set -all --inh-caps -all prlimit "
         "--rtprio=0 --memlock=65536 " ISAC_BIN_DIR
-        "/isac-run hand --pace real --duration '0.2 s' --heartbeat '1 s' " +
+        "/isac-run hand --pace real --duration '0.2 s' --heartbeat '20 s' " +
         more + " >" + out + " 2>&1";
     const int status = std::system(call.c_str());
     return std::pair{WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_text(out)};
