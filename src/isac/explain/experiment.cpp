@@ -51,6 +51,13 @@ Eigen::MatrixXd without(const Eigen::MatrixXd& gram, const std::vector<Eigen::In
   return gram(kept, kept) - cross.transpose() * inner.ldlt().solve(cross);
 }
 
+std::vector<std::size_t> free_of(const Active& model) {
+  std::vector<std::size_t> numbers;
+  for (int p = 0; p < model.hypothesis->info().parameter_count; ++p)
+    if (model.hypothesis->free[static_cast<std::size_t>(p)]) numbers.push_back(static_cast<std::size_t>(p));
+  return numbers;
+}
+
 double step_of(const Active& active, std::size_t k) {
   const auto& info = active.hypothesis->info().parameters[k];
   double scale = std::max(std::abs(active.values[k]), 1e-3 * std::abs(info.typical));
@@ -69,9 +76,7 @@ Eigen::MatrixXd gram_over(const Predictor& predictor, const Fit& stem, const Wei
   std::vector<Eigen::VectorXd> responses, slopes;
   for (const Active& model : models) {
     responses.push_back(response(predictor, stem, here, model, weights));
-    for (int p = 0; p < model.hypothesis->info().parameter_count; ++p) {
-      const auto k = static_cast<std::size_t>(p);
-      if (!model.hypothesis->free[k]) continue;
+    for (const std::size_t k : free_of(model)) {
       // Onsets and widths move events from sample to sample: a longer step sees more of them.
       const bool shape = !model.hypothesis->amplitude[k];
       const double scale = step_of(model, k);
@@ -104,30 +109,67 @@ Designer::Designer(Tie tie, const ExperimentOptions& options) : tie_(std::move(t
     tie_.weights.sigma[3] = std::hypot(tie_.weights.sigma[0], range_.free_row_noise);
   candidates_ = candidate_runs(range_, predictor.data().rig);
   for (PlannedRun& run : candidates_) run = tidy(run);
-  std::vector<Coordinate> used;
-  recorded_ = gram_over(predictor, tie_.stem, tie_.weights, tie_.models, tie_.noise_unit, used);
+  look_back();
+  if (suppose_typical()) look_back();
+}
 
+/// The Gram matrix of what is recorded, where its columns belong, and what is known of them beforehand.
+void Designer::look_back() {
+  std::vector<Coordinate> used;
+  recorded_ = gram_over(*tie_.predictor, tie_.stem, tie_.weights, tie_.models, tie_.noise_unit, used);
   std::vector<double> prior;
-  Eigen::Index of_models = 0;
-  std::vector<double> after;
-  for (const Active& model : tie_.models) {
-    begin_.push_back(of_models);
-    for (int p = 0; p < model.hypothesis->info().parameter_count; ++p) {
-      const auto k = static_cast<std::size_t>(p);
-      if (!model.hypothesis->free[k]) continue;
-      const double share = step_of(model, k) / (model.hypothesis->upper[k] - model.hypothesis->lower[k]);
-      after.push_back(std::isfinite(share) ? kUniform * share * share * tie_.noise_unit : 0.0);
-      ++of_models;
-    }
-  }
-  const Eigen::Index base = recorded_.cols() - of_models - static_cast<Eigen::Index>(tie_.models.size());
   for (const Coordinate& c : used)
     if (c.rest < 0) prior.push_back(c.tolerance ? kTolerancePrior * tie_.noise_unit : 0.0);
-  prior.resize(static_cast<std::size_t>(base), 0.0);
-  prior.insert(prior.end(), after.begin(), after.end());
+  begin_.clear();
+  for (const Active& model : tie_.models) {
+    begin_.push_back(static_cast<Eigen::Index>(prior.size()));
+    for (const std::size_t k : free_of(model)) {
+      const double share = step_of(model, k) / (model.hypothesis->upper[k] - model.hypothesis->lower[k]);
+      prior.push_back(std::isfinite(share) ? kUniform * share * share * tie_.noise_unit : 0.0);
+    }
+  }
+  begin_.push_back(static_cast<Eigen::Index>(prior.size()));
   prior_ = Eigen::Map<Eigen::VectorXd>(prior.data(), static_cast<Eigen::Index>(prior.size()));
-  for (Eigen::Index& b : begin_) b += base;
-  begin_.push_back(base + of_models);
+}
+
+/// A shape that the recordings leave open is a number that noise has drawn: the typical one stands in for it, and the other
+/// numbers of the effect follow as the recordings ask.
+bool Designer::suppose_typical() {
+  bool changed = false;
+  const Eigen::Index base = begin_.front();
+  for (std::size_t m = 0; m < tie_.models.size(); ++m) {
+    Active& model = tie_.models[m];
+    const std::vector<std::size_t> numbers = free_of(model);
+    for (std::size_t j = 0; j < numbers.size(); ++j) {
+      const std::size_t k = numbers[j];
+      const auto& info = model.hypothesis->info().parameters[k];
+      if (model.hypothesis->amplitude[k] || !(std::abs(info.typical) > 0)) continue;
+      const Eigen::Index own = begin_[m] + static_cast<Eigen::Index>(j);
+      std::vector<Eigen::Index> others;
+      for (Eigen::Index i = 0; i < begin_[m + 1]; ++i)
+        if ((i < base || i >= begin_[m]) && i != own) others.push_back(i);
+      Eigen::MatrixXd inner = recorded_(others, others);
+      for (Eigen::Index i = 0; i < inner.rows(); ++i)
+        inner(i, i) += 1e-9 * inner(i, i) + prior_[others[static_cast<std::size_t>(i)]];
+      const Eigen::VectorXd cross = recorded_(others, own), follow = inner.ldlt().solve(cross);
+      const double scale = step_of(model, k),
+                   information = std::max(0.0, recorded_(own, own) - cross.dot(follow)) / tie_.noise_unit,
+                   deviation = information > 0 ? scale / std::sqrt(information) : kNothing,
+                   change = info.typical - model.values[k];
+      if (deviation < 0.5 * std::abs(info.typical) || std::abs(change) > 2 * deviation || change == 0)
+        continue;
+      for (std::size_t i = 0; i < numbers.size(); ++i) {
+        const auto at = std::find(others.begin(), others.end(), begin_[m] + static_cast<Eigen::Index>(i));
+        if (at == others.end() || !model.hypothesis->amplitude[numbers[i]]) continue;
+        double& value = model.values[numbers[i]];
+        value = std::clamp(value - follow[at - others.begin()] * change / scale * step_of(model, numbers[i]),
+                           model.hypothesis->lower[numbers[i]], model.hypothesis->upper[numbers[i]]);
+      }
+      model.values[k] = info.typical;
+      changed = true;
+    }
+  }
+  return changed;
 }
 
 std::optional<Designer::Gram> Designer::gram_of(const PlannedRun& run) const {
@@ -216,9 +258,9 @@ double seconds_needed(double before, double after, double wanted, const PlannedR
                   run.seconds * std::max(0.0, wanted * wanted - before * before) / gained);
 }
 
-/// Fewer seconds are better; among equals, more sigma.
+/// Fewer seconds are better; among equals more sigma, up to twice what is wanted.
 double score_of(double before, double after, double wanted, const PlannedRun& run) {
-  return -seconds_needed(before, after, wanted, run) + 1e-2 * std::min(after, 100.0);
+  return -seconds_needed(before, after, wanted, run) + 1e-2 * std::min(after, 2 * wanted);
 }
 
 /// Every number of the run that its experiment uses, moved up and down by `step`.

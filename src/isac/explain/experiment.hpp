@@ -66,6 +66,8 @@ class Designer {
     Gram gram;
     double score = 0;
   };
+  void look_back();
+  bool suppose_typical();
   [[nodiscard]] std::optional<Gram> gram_of(const PlannedRun& run) const;
   [[nodiscard]] double separation(const Gram& gram, std::size_t a, std::size_t b) const;
   [[nodiscard]] double one_way(const Gram& gram, std::size_t truth, std::size_t refitted) const;

@@ -295,7 +295,7 @@ std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& ri
     const char* waveform;
     double period;
   };
-  for (const double at : {-0.9, -0.45, 0.0, 0.45, 0.9})
+  for (const double at : {0.0, 0.45, -0.45, 0.9, -0.9})
     for (const Wave wave : {Wave{"triangle", 8}, Wave{"steps", 4}, Wave{"sine", 1}, Wave{"sine", 0.25}})
       for (const double swing : {0.4, 1.5}) {
         if (swing < 1 && at != 0) continue;

@@ -52,7 +52,7 @@ struct Action {
 };
 
 constexpr const char* kUnloaded =
-    "take the load off the force sensors and read their zero, then record again";
+    "read the forces unloaded, with the muscles vented and the chains off the sensors, and set their zero";
 constexpr const char* kWeight = "hang a known weight on each force sensor and compare its reading";
 constexpr const char* kGauge =
     "connect a reference gauge to a muscle and compare it with the sensor's reading";
@@ -70,9 +70,7 @@ constexpr Action kActions[] = {
     {"torque_offset", "force_offset", kUnloaded},
     {"torque_offset", "gravity_imbalance", kTilt},
     {"torque_offset", "encoder_offset",
-     "take the load off the force sensors and read their zero, and set the bar to its marked middle and read "
-     "the "
-     "encoder"},
+     "read the forces unloaded, and set the bar to its marked middle and read the encoder"},
     {"force_offset", "encoder_offset", kUnloaded},
     {"pressure_offset", "pressure_gain_error", kVent},
     {"pressure_offset", "torque_offset", kVent},

@@ -1,0 +1,177 @@
+/// @file
+/// Recordings of planned runs made without the toolkit's model: torque law, valve unit and motion written out and integrated
+/// at 10 kHz, sensors with noise and encoder steps. For tests that record what isac-explain asks for.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/explanation.hpp"
+#include "isac/explain/prepared.hpp"
+#include "isac/series/recording.hpp"
+
+namespace isac::test {
+
+/// Truth in SI; effects are absent at nothing.
+struct TiedRig {
+  double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
+  double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 90;  // N at p0
+  double dry = 0, load_exponent = 0;                                   // N m, and its power of p_mean/p0
+  double offset = 0, asymmetry = 0;      // N m at p0 whatever the pressure, and in proportion to it
+  double dead_time = 0, second_lag = 0;  // s
+  double force_noise = 0.3, pressure_noise = 0.004 * kPascalPerKgfCm2;
+
+  [[nodiscard]] explain::RigFacts facts() const {
+    explain::RigFacts f;
+    f.wheel_radius = radius;
+    f.initial_pressure = p0;
+    f.inertia = inertia;
+    f.angle_step = 6.283185307179586 / 8000;
+    f.force_noise = force_noise;
+    f.pressure_noise = pressure_noise;
+    return f;
+  }
+};
+
+namespace detail {
+
+/// The swing of a plan in times its height (docs/formats.md, isac.plan/1).
+inline double swing_at(const explain::PlannedRun& run, double t) {
+  if (!(run.pressure_swing_kgcm2 > 0) || run.waveform == "hold" || t <= 0) return 0;
+  const double turn = t / run.pressure_period_s;
+  if (run.waveform == "sine") return std::sin(6.283185307179586 * turn);
+  if (run.waveform == "steps") {
+    if (turn < 0.25) return 0;
+    return std::fmod(turn - 0.25, 1.0) < 0.5 ? 1 : -1;
+  }
+  const double u = std::fmod(turn, 1.0);
+  return u < 0.25 ? 4 * u : u < 0.75 ? 2 - 4 * u : 4 * u - 4;
+}
+
+}  // namespace detail
+
+/// One planned run on that rig. `number` seeds its noise and the hand's phases, and places it in the day.
+inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& run, std::uint32_t number) {
+  std::mt19937 random(1000 + number);
+  std::normal_distribution<double> gauss;
+  std::uniform_real_distribution<double> uniform(0, 6.283185307179586);
+  constexpr double kStep = 1e-4;
+  constexpr int kPerSample = 20;
+  const double mean =
+      std::isfinite(run.mean_pressure_kgcm2) ? run.mean_pressure_kgcm2 * kPascalPerKgfCm2 : rig.p0;
+  const bool both = run.experiment == "constant-pressure" || run.experiment == "pcu-step";
+  const auto command = [&](double t, int i) {
+    const double s = detail::swing_at(run, t) * run.pressure_swing_kgcm2 * kPascalPerKgfCm2;
+    const double difference = run.delta_pressure_kgcm2 * kPascalPerKgfCm2 + (both ? 0.0 : s);
+    return mean + (both ? s : 0.0) + (i == 0 ? -difference : difference);
+  };
+  double q[2], p[2];
+  for (int i = 0; i < 2; ++i) p[i] = rig.K_C * (q[i] = command(-1, i));
+  const double stiffness = rig.A * rig.radius * rig.radius;
+  const double rest = -rig.B * rig.radius * 0.5 * (p[1] - p[0]) / stiffness;
+  const double middle = std::isfinite(run.middle_rad)                                       ? run.middle_rad
+                        : run.experiment == "constant-pressure" || run.experiment == "free" ? rest
+                                                                                            : 0.0;
+  const bool hand = run.experiment == "constant-pressure", free = run.experiment == "free";
+  const double share[3] = {0.8, 0.12, 0.08}, tone[3] = {1.0, 0.414, 1.618};
+  double phase[3], steepest = 0;
+  for (int i = 0; i < 3; ++i) {
+    phase[i] = uniform(random);
+    steepest += share[i] * tone[i];
+  }
+  const double omega = hand ? run.peak_speed_rad_s / (run.amplitude_rad * steepest) : 0;
+  double angle = middle, velocity = 0;
+  const auto torque = [&](double w) {
+    const double dp = 0.5 * (p[1] - p[0]), pm = 0.5 * (p[0] + p[1]);
+    const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
+    return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w - rig.D * w -
+           rig.dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset +
+           rig.asymmetry * pm / rig.p0;
+  };
+  series::Recording out;
+  out.source = "run" + std::to_string(number) + ".csv";
+  out.metadata["experiment"] = run.experiment;
+  char started[40];
+  std::snprintf(started, sizeof started, "2026-11-20T%02u:%02u:00Z", 8 + number / 30, 2 * (number % 30));
+  out.metadata["started"] = started;
+  const char* names[] = {"time", "angle", "p1", "p2", "p1_cmd", "p2_cmd", "F1", "F2"};
+  const char* units[] = {"s", "rad", "Pa", "Pa", "Pa", "Pa", "N", "N"};
+  for (int c = 0; c < 8; ++c) out.columns.push_back({names[c], units[c], {}});
+  const double encoder = 6.283185307179586 / 8000;
+  const long samples = std::lround(run.seconds * 500);
+  for (long k = 0; k <= samples * kPerSample; ++k) {
+    const double t = static_cast<double>(k) * kStep;
+    if (hand) {
+      angle = middle;
+      velocity = 0;
+      for (int i = 0; i < 3; ++i) {
+        angle += run.amplitude_rad * share[i] * std::sin(omega * tone[i] * t + phase[i]);
+        velocity += run.amplitude_rad * share[i] * omega * tone[i] * std::cos(omega * tone[i] * t + phase[i]);
+      }
+    }
+    if (k % kPerSample == 0 && k < samples * kPerSample) {
+      const double T = torque(velocity), common = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
+      const double row[8] = {t,
+                             encoder * std::round(angle / encoder),
+                             p[0] + rig.pressure_noise * gauss(random),
+                             p[1] + rig.pressure_noise * gauss(random),
+                             command(t, 0),
+                             command(t, 1),
+                             common - 0.5 * T / rig.radius + rig.force_noise * gauss(random),
+                             common + 0.5 * T / rig.radius + rig.force_noise * gauss(random)};
+      for (std::size_t c = 0; c < 8; ++c) out.columns[c].values.push_back(row[c]);
+    }
+    for (int i = 0; i < 2; ++i) {
+      const double u = command(t - rig.dead_time, i);
+      if (rig.second_lag > 0) {
+        q[i] += kStep / rig.second_lag * (u - q[i]);
+      } else {
+        q[i] = u;
+      }
+      p[i] += kStep / rig.T_C * (rig.K_C * q[i] - p[i]);
+    }
+    if (free) {  // dry friction holds the joint where no torque overcomes it
+      const double push = torque(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
+      const bool held = velocity == 0 && push * torque(0) <= 0;
+      const double next = held ? 0 : velocity + kStep * push / rig.inertia;
+      velocity = velocity * next < 0 ? 0 : next;
+      angle += kStep * velocity;
+    }
+  }
+  return out;
+}
+
+inline explain::PlannedRun by_hand(double seconds, double amplitude, double speed, double difference = 0) {
+  return {.experiment = "constant-pressure",
+          .seconds = seconds,
+          .delta_pressure_kgcm2 = difference,
+          .mean_pressure_kgcm2 = 3,
+          .amplitude_rad = amplitude,
+          .peak_speed_rad_s = speed,
+          .waveform = "hold"};
+}
+
+inline explain::PlannedRun clamped(double seconds, double angle, double swing, double period,
+                                   const char* waveform = "triangle") {
+  return {.experiment = "constant-angle",
+          .seconds = seconds,
+          .mean_pressure_kgcm2 = 3,
+          .middle_rad = angle,
+          .pressure_swing_kgcm2 = swing,
+          .pressure_period_s = period,
+          .waveform = waveform};
+}
+
+inline std::vector<series::Recording> record_all(const TiedRig& rig,
+                                                 const std::vector<explain::PlannedRun>& runs,
+                                                 std::uint32_t first = 1) {
+  std::vector<series::Recording> out;
+  for (const auto& run : runs) out.push_back(record(rig, run, first++));
+  return out;
+}
+
+}  // namespace isac::test
