@@ -7,6 +7,7 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/experiment.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/search.hpp"
 
@@ -141,6 +142,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.gap.heldout_after = scale * after.rms();
     e.gap.heldout_zero_model = scale * before.signal_rms();
   }
+  if (options.next_experiment)
+    e.next_experiment = next_experiment(predictor, library, found, {.threads = options.threads});
   return e;
 }
 
