@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <thread>
 
@@ -42,13 +44,20 @@ class Run {
   RigRunOutcome play() {
     if (!options_.log.empty()) open_log();
     try {
-      const runtime::VentGuard vent(*rig_.card);
-      drive();
-    } catch (const Error& error) {
+      {
+        const runtime::VentGuard vent(*rig_.card);
+        drive();
+      }
       close_log();
-      throw Error(error.kind(), error.code(), error.text() + kept());
+    } catch (const Error& error) {
+      const bool torn = writer_ && writer_->failed();
+      if (torn) {
+        set_log_aside();
+      } else {
+        close_log();
+      }
+      throw Error(error.kind(), error.code(), error.text() + kept(torn), error.place());
     }
-    close_log();
     return outcome_;
   }
 
@@ -75,11 +84,18 @@ class Run {
     writer_.reset();
   }
 
-  [[nodiscard]] std::string kept() const {
+  /// A log that could not be written is no log of the run: it steps aside under another name.
+  void set_log_aside() {
+    writer_.reset();
+    std::error_code ignored;
+    std::filesystem::rename(options_.log, options_.log + ".incomplete", ignored);
+  }
+
+  [[nodiscard]] std::string kept(bool torn) const {
     std::string text = "; the valves are vented and the gains stay as they were";
-    if (!options_.log.empty())
-      text += fmt::format(", the {} samples until then are in {}", outcome_.rows, options_.log);
-    return text;
+    if (options_.log.empty()) return text;
+    if (torn) return text + ", what was written is in " + options_.log + ".incomplete";
+    return text + fmt::format(", the {} samples until then are in {}", outcome_.rows, options_.log);
   }
 
   [[noreturn]] void card_failed(Status status) const {

@@ -79,8 +79,9 @@ Figure bode_figure(const TuneReportInput& input, const Candidate& chosen) {
                     "gain margin is 1/|L| there).",
                 .shared_x = true};
   const Axis frequency{.label = "Frequency", .unit = "Hz", .tight = true, .log = true};
-  figure.panels = {{.x = frequency, .y = {.label = "|L|", .log = true}, .lines = {{.at = 1}}},
-                   {.x = frequency, .y = {.label = "Phase", .unit = "°"}, .lines = {{.at = -180}}}};
+  figure.panels = {
+      {.x = frequency, .y = {.label = "|L|", .log = true}, .lines = {{.at = 1}}},
+      {.x = frequency, .y = {.label = "Phase", .unit = "°"}, .lines = {{.at = -180, .label = "−180°"}}}};
   if (input.tuning->before)
     add_bode(figure, *input.model, *input.tuning->before, "before", colour::kReference, Dash::kDashed);
   add_bode(figure, *input.model, chosen, "new gains", colour::kModel, Dash::kSolid);

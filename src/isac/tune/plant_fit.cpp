@@ -21,6 +21,7 @@ namespace {
 constexpr std::size_t kRowsWanted = 3000;  // of residuals; the command is never thinned
 constexpr int kParameters = 7;             // log K, log T_C, log T_J, log ζ, L/scale, φ_0/size, load/reach
 constexpr int kFree = 5;
+constexpr double kAtTheNoise = 1.05;  // rms of the residual over the angle's scatter at rest
 using Vector = std::array<double, kParameters>;
 
 struct Problem {
@@ -341,6 +342,9 @@ PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& option
   for (const Start& start : starts_of(problem)) {
     Solution s = solve(problem, start.x);
     if (std::isfinite(s.cost) && s.cost < best.cost) best = std::move(s);
+    // Nothing but the noise at rest is left over: no other start can do better.
+    const double left = problem.size * std::sqrt(2 * best.cost / static_cast<double>(problem.residuals()));
+    if (best.converged && left < kAtTheNoise * options.noise) break;
   }
   PlantFit fit;
   fit.record = problem.record;

@@ -4,7 +4,7 @@
 ///   u = bias + amplitude · s;  s = +1 once φ < φ_0 − ε, −1 once φ > φ_0 + ε, else as before         ε: against noise
 ///   bias += amplitude/2 · (t_up − t_down)/(t_up + t_down) after every cycle, so that a load or another φ_0 does not tilt the cycle
 ///   describing function     K_DF = 4 amplitude/(π √(a² − ε²)), T_DF = the cycle's period       a: amplitude of φ
-/// K_DF supposes that φ is a sine and that the cycle lies at phase −π. With the joint's third-order lag it is off by −25 … +10 %
+/// K_DF supposes that φ is a sine and that the cycle lies at phase −π. With the joint's third-order lag it comes out up to 30 % too small
 /// (docs/derivations/tuning.md); K_crit and T_crit are therefore taken from a plant fitted to the cycle (plant_fit.hpp).
 ///
 /// Units: SI. Real time, threads, errors: as experiment.hpp; fails when the joint does not swing, or not evenly.
