@@ -44,7 +44,7 @@ std::string RealTime::words() const {
 void keep_stacks_small() noexcept {
   pthread_attr_t attributes;
   if (pthread_attr_init(&attributes) != 0) return;
-  pthread_attr_setstacksize(&attributes, 4 * kStackBytes);
+  pthread_attr_setstacksize(&attributes, 8 * kStackBytes);
   static_cast<void>(pthread_setattr_default_np(&attributes));  // where refused, the usual size
   pthread_attr_destroy(&attributes);
 }
