@@ -35,6 +35,7 @@ report::ExplainReportInput report_input(const explain::Explanation& answer, cons
   input.head.title = inputs.title.empty() ? "What is missing" : "What is missing: " + inputs.title;
   input.head.created = apps::now_iso8601();
   input.answer = &answer;
+  input.position_unit = inputs.baseline.position_unit;
   input.compensation = compensation;
   input.params_file = apps::short_name(words.params);
   if (answer.next_experiment && !answer.next_experiment->runs.empty())

@@ -84,7 +84,8 @@ record::Params params_of(const explain::Explanation& answer, const ExplainInputs
   }
   if (std::isfinite(inputs.facts.wheel_radius))
     joint.constants.emplace_back("wheel_radius_m", inputs.facts.wheel_radius);
-  joint.constants.emplace_back("initial_pressure_Pa", inputs.facts.initial_pressure);
+  if (inputs.baseline.terms.empty() || !inputs.rig_file.empty())
+    joint.constants.emplace_back("initial_pressure_Pa", inputs.facts.initial_pressure);
   if (std::isfinite(inputs.facts.inertia))
     joint.constants.emplace_back("inertia_kg_m2", inputs.facts.inertia);
   params.sections.push_back(std::move(joint));

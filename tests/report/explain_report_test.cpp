@@ -135,9 +135,18 @@ TEST(ExplainFigures, show_the_mean_residual_of_friction_over_speed) {
   }
 }
 
+TEST(ExplainFigures, speak_of_position_and_metres_for_a_linear_axis) {
+  const Figure figure = profile_figure(named_sample(), "torque", "m");
+  ASSERT_GE(figure.panels.size(), 2U);
+  EXPECT_EQ(figure.panels[0].x.unit, "m/s");
+  EXPECT_EQ(figure.panels[1].x.label, "Position x");
+}
+
 TEST(ExplainWords, never_say_that_something_is_certain) {
   EXPECT_EQ(percent(0.9999), "> 99 %");
+  EXPECT_EQ(percent(1), "> 99 %");
   EXPECT_EQ(percent(0.0001), "< 1 %");
+  EXPECT_EQ(percent(0), "< 1 %");
   EXPECT_EQ(percent(std::nan("")), "–");
   EXPECT_EQ(joined({"a", "b", "c"}), "a, b and c");
 }

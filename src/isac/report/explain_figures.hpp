@@ -17,9 +17,11 @@ namespace isac::report {
 /// Measured, simulated before and after; below, what both leave over. Held-out runs first.
 [[nodiscard]] std::vector<Figure> run_figures(const explain::Explanation& e, std::size_t most);
 /// Mean residual over speed, angle and both pressures, before and after.
-[[nodiscard]] Figure profile_figure(const explain::Explanation& e, const std::string& signal);
+[[nodiscard]] Figure profile_figure(const explain::Explanation& e, const std::string& signal,
+                                    const std::string& position_unit = "rad");
 /// Mean residual over speed and angle, and over Δp and angle, before and after.
-[[nodiscard]] Figure map_figure(const explain::Explanation& e, const std::string& signal);
+[[nodiscard]] Figure map_figure(const explain::Explanation& e, const std::string& signal,
+                                const std::string& position_unit = "rad");
 /// The shape of what has no name.
 [[nodiscard]] Figure unknown_figure(const explain::Explanation& e);
 

@@ -66,14 +66,15 @@ std::vector<double> inside(const std::vector<double>& values, Range range) {
 }
 
 struct Variable {
-  const char *label, *unit;
+  std::string label, unit;
   const std::vector<double>* values;
   double least;  ///< range below which it stands still
 };
 
-std::vector<Variable> variables_of(const Samples& all) {
-  return {{"Speed φ̇", "rad/s", &all.speed, 0.05},
-          {"Angle φ", "rad", &all.angle, 0.02},
+std::vector<Variable> variables_of(const Samples& all, const std::string& position_unit) {
+  const bool rotary = position_unit == "rad";
+  return {{rotary ? "Speed φ̇" : "Speed v", position_unit + "/s", &all.speed, rotary ? 0.05 : 1e-4},
+          {rotary ? "Angle φ" : "Position x", position_unit, &all.angle, rotary ? 0.02 : 1e-4},
           {"Pressure difference Δp", "kg/cm2", &all.delta_pressure, 0.05},
           {"Mean pressure", "kg/cm2", &all.mean_pressure, 0.05}};
 }
@@ -145,7 +146,7 @@ void add_map(Figure& figure, const Variable& x, const Variable& y, const Samples
 
 }  // namespace
 
-Figure profile_figure(const Explanation& e, const std::string& signal) {
+Figure profile_figure(const Explanation& e, const std::string& signal, const std::string& position_unit) {
   const Samples all = gather(e, signal);
   const bool added = !e.effects.empty();
   Figure figure{
@@ -156,7 +157,7 @@ Figure profile_figure(const Explanation& e, const std::string& signal) {
                  " in bins of one variable, over all runs. A model that lacks nothing lies on zero.",
       .columns = 2,
       .panel_height = 170};
-  for (const Variable& variable : variables_of(all)) {
+  for (const Variable& variable : variables_of(all, position_unit)) {
     if (!moves(*variable.values, variable.least)) continue;
     const std::vector<double> x = inside(*variable.values, used_range(*variable.values));
     Panel panel{.x = {.label = variable.label, .unit = variable.unit, .tight = true},
@@ -184,7 +185,7 @@ Figure profile_figure(const Explanation& e, const std::string& signal) {
   return figure;
 }
 
-Figure map_figure(const Explanation& e, const std::string& signal) {
+Figure map_figure(const Explanation& e, const std::string& signal, const std::string& position_unit) {
   const Samples all = gather(e, signal);
   const bool added = !e.effects.empty();
   const std::string unit = pretty_unit(all.unit);
@@ -196,7 +197,7 @@ Figure map_figure(const Explanation& e, const std::string& signal) {
                            ". White: fewer than three samples.",
                 .columns = added ? 2 : 1,
                 .panel_height = kMapHeight};
-  const auto variables = variables_of(all);
+  const auto variables = variables_of(all, position_unit);
   const Variable &speed = variables[0], &angle = variables[1], &difference = variables[2],
                  &mean = variables[3];
   if (!moves(*angle.values, angle.least)) return {};

@@ -120,7 +120,8 @@ void add_gap(Document& page, const Explanation& e) {
   }
 }
 
-void add_where(Document& page, const Explanation& e) {
+void add_where(Document& page, const ExplainReportInput& input) {
+  const Explanation& e = *input.answer;
   page.heading("Where");
   std::vector<std::string> regions;
   for (const explain::Region& region : e.where) regions.push_back(upper_first(region_sentence(region)) + ".");
@@ -128,8 +129,8 @@ void add_where(Document& page, const Explanation& e) {
   bool any = false;
   for (const std::string& signal : signals_of(e)) {
     if (signal != e.gap.signal && !signals_of(e).empty() && signal != signals_of(e).front()) continue;
-    any = page.add_figure(profile_figure(e, signal)) || any;
-    any = page.add_figure(map_figure(e, signal)) || any;
+    any = page.add_figure(profile_figure(e, signal, input.position_unit)) || any;
+    any = page.add_figure(map_figure(e, signal, input.position_unit)) || any;
   }
   if (!any && regions.empty()) page.paragraph("No region stands out.");
 }
@@ -350,7 +351,7 @@ std::string render_explain_report(const ExplainReportInput& input) {
   add_answer(page, e);
   page.box(BoxKind::kWarning, "Before you rely on this", warning_texts(e.warnings));
   add_gap(page, e);
-  add_where(page, e);
+  add_where(page, input);
   add_what(page, e);
   add_proof(page, e);
   add_numbers(page, e);

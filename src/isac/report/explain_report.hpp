@@ -23,6 +23,7 @@ namespace isac::report {
 struct ExplainReportInput {
   ReportHead head = {};
   const explain::Explanation* answer = nullptr;  ///< must not be null
+  std::string position_unit = "rad";             ///< of the traces' angle: "m" for a linear axis
   std::vector<std::string> compensation =
       {};                        ///< what a controller does about each effect added, in sentences
   std::string params_file = {};  ///< name of the params.toml written beside; empty: none

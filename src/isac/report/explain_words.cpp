@@ -171,8 +171,8 @@ std::string equation_in_words(const std::string& equation) {
 std::string percent(double share) {
   if (!std::isfinite(share)) return "–";
   const double value = 100 * share;
-  if (value > 99 && value < 100) return "> 99 %";
-  if (value > 0 && value < 1) return "< 1 %";
+  if (value > 99 && value <= 100) return "> 99 %";
+  if (value >= 0 && value < 1) return "< 1 %";
   return fixed_decimals(value, 0) + " %";
 }
 
