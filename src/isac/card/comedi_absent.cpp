@@ -1,6 +1,4 @@
 // Built where libcomedi is missing.
-#include <string>
-
 #include "isac/card/comedi_card.hpp"
 #include "isac/core/error.hpp"
 
@@ -9,10 +7,6 @@ namespace isac::card {
 Opened open_comedi(const SignalTable&, std::unique_ptr<ComediClock>) {
   throw Error(ErrorKind::kStopped, "comedi_not_built",
               "this program was built without libcomedi; install libcomedi-dev and build it again");
-}
-
-Opened open_comedi(std::string_view rest) {
-  return open_comedi(read_signal_table(std::string(rest)));
 }
 
 }  // namespace isac::card

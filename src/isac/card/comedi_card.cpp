@@ -384,12 +384,4 @@ Opened open_comedi(const SignalTable& table, std::unique_ptr<ComediClock> clock)
   return opened;
 }
 
-Opened open_comedi(std::string_view rest) {
-  if (rest.empty()) {
-    throw Error(ErrorKind::kUsage, "card_name",
-                "comedi: needs a table of signals behind it, like comedi:data/cards/testbed.toml.");
-  }
-  return open_comedi(read_signal_table(std::string(rest)));
-}
-
 }  // namespace isac::card

@@ -21,7 +21,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string_view>
 
 #include "isac/card/card.hpp"
 #include "isac/card/signal_table.hpp"
@@ -38,7 +37,5 @@ class ComediClock {
 
 /// `clock` null: the system's. No person is at such a card.
 [[nodiscard]] Opened open_comedi(const SignalTable& table, std::unique_ptr<ComediClock> clock = nullptr);
-/// `rest` is what stands behind "comedi:", a table's file.
-[[nodiscard]] Opened open_comedi(std::string_view rest);
 
 }  // namespace isac::card

@@ -33,7 +33,14 @@ constexpr std::array kBackEnds{
               return open_replay(rest);
             }},
     BackEnd{"comedi", "comedi:TABLE.toml  hardware through Comedi, by a table of signals (data/cards)",
-            [](std::string_view rest) { return open_comedi(rest); }},
+            [](std::string_view rest) {
+              if (rest.empty() || rest.starts_with("/dev/")) {
+                throw Error(ErrorKind::kUsage, "card_name",
+                            "comedi: needs a table of signals behind it, which names the devices, like "
+                            "comedi:data/cards/testbed.toml.");
+              }
+              return open_comedi(read_signal_table(std::string(rest)));
+            }},
 };
 
 }  // namespace
