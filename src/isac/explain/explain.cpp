@@ -10,6 +10,7 @@
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/search.hpp"
+#include "isac/explain/unknown.hpp"
 
 namespace isac::explain {
 namespace {
@@ -34,6 +35,7 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
   const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(trial.hypothesis)];
   Candidate c;
   c.id = h.id();
+  c.form = h.info().id;
   c.name = h.info().term;
   c.subsystem = subsystem_name(h);
   c.equation = h.info().equation;
@@ -77,6 +79,47 @@ const char* to_string(Verdict verdict) noexcept {
   return "";
 }
 
+namespace {
+
+void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof, Chain chain,
+              const BaselineModel& baseline, Gap& gap) {
+  const bool pressure = chain == Chain::kPressure1 || chain == Chain::kPressure2;
+  const double scale = pressure ? 1 / kPascalPerKgfCm2 : 1.0;
+  gap.signal = chain == Chain::kTorque      ? baseline.output
+               : chain == Chain::kMotion    ? "motion"
+               : chain == Chain::kPressure1 ? "p1"
+                                            : "p2";
+  gap.unit = chain == Chain::kTorque ? baseline.output_unit : pressure ? "kg/cm2" : "N m";
+  gap.before = scale * raw_residual(predictor, found.baseline.model, chain).rms();
+  gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
+  gap.noise_floor = scale * found.floors.white[static_cast<int>(chain)];
+  if (proof.runs() == 0) return;
+  const Sums before = proof.residual(found.baseline.model, chain),
+             after = proof.residual(found.model.model, chain);
+  gap.heldout_before = scale * before.rms();
+  gap.heldout_after = scale * after.rms();
+  gap.heldout_zero_model = scale * before.signal_rms();
+  const double floor2 = gap.noise_floor * gap.noise_floor,
+               open = gap.heldout_before * gap.heldout_before - floor2;
+  if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
+}
+
+/// None of the catalogue: what came nearest is told as ruled out, nothing is added.
+void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
+  for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
+  for (Candidate& c : e.alternatives) e.rejected.push_back(c);
+  e.effects.clear();
+  e.alternatives.clear();
+  e.gap.after = e.gap.before;
+  e.gap.heldout_after = e.gap.heldout_before;
+  e.gap.share_closed = 0;
+  if (!found.steps.empty())
+    e.unknown =
+        describe_unknown(around(predictor, found.baseline, found.weights), found.steps.front().screen);
+}
+
+}  // namespace
+
 Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout,
                     const ExplainOptions& options) {
   check_terms(options.baseline);
@@ -118,30 +161,16 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   } else {
     e.verdict = single ? Verdict::kNamed : (one_family ? Verdict::kFamily : Verdict::kNotSeparable);
   }
-  Chain chain = Chain::kTorque;
+  Chain chain = found.gate.chain;
   if (!found.added.empty())
     (void)size_over_floor(data, found.weights, found.floors, found.model.residual - found.baseline.residual,
                           &chain);
-  const double scale = chain == Chain::kPressure1 || chain == Chain::kPressure2 ? 1 / kPascalPerKgfCm2 : 1.0;
-  e.gap.signal = chain == Chain::kTorque      ? options.baseline.output
-                 : chain == Chain::kMotion    ? "motion"
-                 : chain == Chain::kPressure1 ? "p1"
-                                              : "p2";
-  e.gap.unit = chain == Chain::kTorque   ? options.baseline.output_unit
-               : chain == Chain::kMotion ? "N m"
-                                         : "kg/cm2";
-  e.gap.before = scale * raw_residual(predictor, found.baseline.model, chain).rms();
-  e.gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
-  e.gap.noise_floor = scale * found.floors.white[static_cast<int>(chain)];
   const Proof proof(heldout, data);
   e.heldout_runs = proof.runs();
-  if (proof.runs() > 0) {
-    const Sums before = proof.residual(found.baseline.model, chain),
-               after = proof.residual(found.model.model, chain);
-    e.gap.heldout_before = scale * before.rms();
-    e.gap.heldout_after = scale * after.rms();
-    e.gap.heldout_zero_model = scale * before.signal_rms();
-  }
+  fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
+  // A model that does worse on what it has not seen is not an explanation.
+  if (!e.effects.empty() && e.gap.heldout_after > 1.002 * e.gap.heldout_before) e.verdict = Verdict::kUnknown;
+  if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
   if (options.next_experiment)
     e.next_experiment = next_experiment(predictor, library, found, {.threads = options.threads});
   return e;

@@ -58,6 +58,7 @@ struct Evidence {
 /// A candidate that was refitted together with the baseline.
 struct Candidate {
   std::string id, name;   ///< of the catalogue
+  std::string form;       ///< the catalogue's entry whose equation it is: `id`, or another form of it
   std::string subsystem;  ///< "muscle", "joint", "pcu", "sensor", "rig"
   std::string equation;
   double confidence = kNotKnown;      ///< calibrated (docs/explain.md)

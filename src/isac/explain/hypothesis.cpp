@@ -50,12 +50,18 @@ Reach reach_of(const Prepared& data) {
   return reach;
 }
 
+bool one_of(string_view id, std::initializer_list<string_view> ids) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
 /// Grids of the shape parameters; `at` counts the parameter within its effect.
 std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   const double bar = kPascalPerKgfCm2;
   if (id == "stribeck_friction" && at == 2) return {0.03, 0.1, 0.3};
   if (id == "pressure_dependent_friction" && at == 1) return {1.0};
-  if (id == "hysteresis" && at == 1) return {0.01, 0.04, 0.15};
+  if (one_of(id, {"hysteresis", "maxwell_slip"}) && at == 1) return {0.01, 0.04, 0.15};
+  if (id == "pressure_creep" && at == 1) return {2, 10, 50};
+  if (id == "valve_stiction" && at == 0) return {0.01 * bar, 0.05 * bar};
   if (id == "asymmetric_hysteresis" && at >= 2) return {0.04};
   if (id == "creep" && at == 1) return {1, 4, 15, 60, 250};
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
@@ -118,7 +124,7 @@ std::vector<Values> shapes_of(const EffectInfo& info, const Reach& reach) {
 
 bool jumps_with_direction(int effect, const EffectInfo& info) {
   if (info.hook != Hook::kTorque) return false;
-  if (info.state_count > 0) return info.state_count == 1 && string_view(info.id) != "creep";
+  if (info.state_count > 0) return info.state_count == 1 && !one_of(info.id, {"creep", "pressure_creep"});
   models::JointPoint<double> x;
   x.angle = 0.3;
   x.mean_pressure = x.reference_pressure = 3e5;
@@ -201,10 +207,6 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
   return h;
 }
 
-bool one_of(string_view id, std::initializer_list<string_view> ids) {
-  return std::find(ids.begin(), ids.end(), id) != ids.end();
-}
-
 unsigned chains_in(const Prepared& data) {
   unsigned chains = 0;
   for (const Row& row : data.rows) chains |= bit(row.chain);
@@ -245,16 +247,18 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
   for (int e = 0; e < static_cast<int>(catalogue.size()); ++e) {
     const EffectInfo& info = catalogue[static_cast<unsigned>(e)];
     const string_view id = info.id;
-    if (in_baseline(info.id) || is_excluded(info.id) || info.hook == Hook::kOutlier) continue;
+    if (in_baseline(info.id) || is_excluded(info.id) ||
+        (info.reported_as != nullptr && is_excluded(info.reported_as)) || info.hook == Hook::kOutlier)
+      continue;
     if (one_of(id, {"mains_hum", "periodic_disturbance"}))
       continue;  // found by their spectrum (spectrum.hpp)
     if (!seed) {
       // A sum of terms has no forces, pressures or motion of its own: torques on the output, and the angle's sensor.
       if (info.hook != Hook::kTorque && !touches(e, info).angle) continue;
-      if (one_of(id, {"offset", "inertia_error", "bearing_friction", "stiffness", "pressure", "backlash",
-                      "lever_arm_variation", "muscle_asymmetry", "pressure_dependent_stiffness",
-                      "quadratic_pressure_angle", "nonlinear_pressure_gain", "pressure_dependent_damping",
-                      "pressure_dependent_friction"}))
+      if (one_of(id, {"pressure_creep", "offset", "inertia_error", "bearing_friction", "stiffness",
+                      "pressure", "backlash", "lever_arm_variation", "muscle_asymmetry",
+                      "pressure_dependent_stiffness", "quadratic_pressure_angle", "nonlinear_pressure_gain",
+                      "pressure_dependent_damping", "pressure_dependent_friction"}))
         continue;
       if (id == "torque_offset" && in_baseline("offset")) continue;
       if (id == "encoder_offset" || id == "encoder_gain") continue;  // nothing says where the zero is
@@ -306,7 +310,8 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
 const char* family_of(int effect) noexcept {
   const auto catalogue = models::effect_catalogue();
   if (effect < 0 || effect >= static_cast<int>(catalogue.size())) return "";
-  const string_view id = catalogue[static_cast<unsigned>(effect)].id;
+  const EffectInfo& info = catalogue[static_cast<unsigned>(effect)];
+  const string_view id = info.reported_as != nullptr ? info.reported_as : info.id;
   if (one_of(id, {"coulomb_friction", "stribeck_friction", "pressure_dependent_friction", "hysteresis",
                   "asymmetric_hysteresis", "bearing_friction", "backlash", "encoder_play"}))
     return "rate-independent dissipation";

@@ -48,7 +48,10 @@ struct Hypothesis {
   [[nodiscard]] const models::EffectInfo& info() const noexcept {
     return models::effect_catalogue()[static_cast<unsigned>(effect)];
   }
-  [[nodiscard]] std::string id() const { return info().id; }
+  /// The effect that is named: another form of it speaks under its id.
+  [[nodiscard]] std::string id() const {
+    return info().reported_as != nullptr ? info().reported_as : info().id;
+  }
   [[nodiscard]] int parameters() const noexcept;  ///< how many are free
 };
 

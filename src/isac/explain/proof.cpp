@@ -63,6 +63,16 @@ Label label_of(const Predictor& predictor, Chain chain) {
 
 }  // namespace
 
+namespace {
+
+bool has_rows(const Prepared& data, std::size_t run, Chain chain) {
+  for (std::size_t i = data.run_begin[run]; i < data.run_begin[run + 1]; ++i)
+    if (data.rows[i].chain == chain) return true;
+  return false;
+}
+
+}  // namespace
+
 double Sums::rms() const {
   return samples > 0 ? std::sqrt(squares / static_cast<double>(samples)) : kNotKnown;
 }
@@ -74,7 +84,7 @@ Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain cha
   Sums sums;
   for (std::size_t r = 0; r < predictor.data().runs.size(); ++r) {
     const PreparedRun& run = predictor.data().runs[r];
-    if (predictor.data().run_begin[r] == predictor.data().run_begin[r + 1]) continue;
+    if (!has_rows(predictor.data(), r, chain)) continue;
     const Predictor::FullRate rate = predictor.full_rate(model, r);
     const std::vector<double>& y = predicted(rate, chain);
     const std::vector<double>& measured = read_signal(run, chain);
@@ -95,7 +105,7 @@ std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& be
   const Label label = label_of(predictor, chain);
   for (std::size_t r = 0; r < predictor.data().runs.size(); ++r) {
     const PreparedRun& run = predictor.data().runs[r];
-    if (predictor.data().run_begin[r] == predictor.data().run_begin[r + 1]) continue;
+    if (!has_rows(predictor.data(), r, chain)) continue;
     const Predictor::FullRate old_rate = predictor.full_rate(before, r),
                               new_rate = predictor.full_rate(after, r);
     const std::vector<double>&y0 = predicted(old_rate, chain), &y1 = predicted(new_rate, chain);

@@ -212,8 +212,10 @@ class Search {
       if (c.gain < kWorthRefitting * best && c.gain < kWorthRefittingUnits * s.noise_unit) break;
       if (c.gain < 0.15 * best && list.size() >= 4) break;
       const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
-      if (std::find(found_.added.begin(), found_.added.end(), c.hypothesis) != found_.added.end()) continue;
-      if (++per_id[h.id()] > 2) continue;
+      if (std::any_of(found_.added.begin(), found_.added.end(),
+                      [&](int a) { return library_.hypotheses[static_cast<std::size_t>(a)].id() == h.id(); }))
+        continue;
+      if (++per_id[h.id()] > 3) continue;
       list.push_back(c);
     }
     return list;

@@ -60,6 +60,7 @@ struct EffectInfo {
       false;  ///< never gives energy: torque · velocity ≤ 0 (over a cycle, where it has states)
   bool added_to_output =
       false;  ///< a constant of the recorded output, not a resistance: its sign is never turned
+  const char* reported_as = nullptr;  ///< another form of this effect: the id under which a search names it
 };
 
 /// Where a torque effect is evaluated. A linear axis puts metres and newtons in place of radians and newton metres.

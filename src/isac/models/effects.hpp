@@ -23,6 +23,7 @@
 #include "isac/models/effect_types.hpp"
 #include "isac/models/effects_friction.hpp"
 #include "isac/models/effects_memory.hpp"
+#include "isac/models/effects_other_forms.hpp"
 #include "isac/models/effects_pcu.hpp"
 #include "isac/models/effects_sensor.hpp"
 #include "isac/models/effects_torque.hpp"
@@ -30,7 +31,7 @@
 namespace isac::models {
 
 using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::MemoryEffects,
-                       effect::PcuEffects, effect::SensorEffects>::type;
+                       effect::PcuEffects, effect::SensorEffects, effect::OtherForms>::type;
 
 /// All effects; the position in the list is the effect's index for effect_torque() and the other hooks.
 [[nodiscard]] inline std::span<const EffectInfo> effect_catalogue() noexcept {

@@ -1,0 +1,267 @@
+#include "isac/explain/describe.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/explain/labels.hpp"
+#include "isac/explain/uncertainty.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr std::size_t kTracePoints = 2000;
+constexpr double kWorthTelling = 0.03;  // relative change of a base parameter
+
+std::string upper_first(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  return text;
+}
+
+std::string with_unit(double value, const std::string& unit) {
+  return rounded(value) + (unit.empty() || unit == "-" ? "" : " " + unit);
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == words.size() ? " and " : ", ") + words[i];
+  return text;
+}
+
+std::string numbers_of(const Candidate& c) {
+  std::vector<std::string> words;
+  for (const Estimated& p : c.parameters)
+    if (std::isfinite(p.value)) words.push_back(with_error(p.name, p.value, p.std_error, p.unit));
+  return joined(words);
+}
+
+std::string p_in_words(double p) {
+  return p < 0.001 ? "p < 0.001" : "p = " + rounded(p, p < 0.01 ? 1 : 2);
+}
+
+Chain chain_of(const Prepared& data, const std::string& signal) {
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion})
+    if (label_of(data, chain).signal == signal) return chain;
+  return Chain::kTorque;
+}
+
+/// p-value of the largest score of one chain over all columns that show in it, by the normal tail of each.
+double chain_p_value(const Found& found, const Library& library, Chain chain) {
+  if (found.steps.empty()) return 1;
+  if (chain == found.gate.chain && found.gate.significant) return found.gate.p_value;
+  const Screen& screen = found.steps.front().screen;
+  double largest = 0;
+  std::size_t columns = 0;
+  for (const Column& c : screen.columns) {
+    const unsigned chains = c.hypothesis >= 0
+                                ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
+                                : bit(c.chain);
+    if (chains != bit(chain)) continue;
+    ++columns;
+    largest = std::max(largest, c.T);
+  }
+  return columns == 0 ? 1.0
+                      : std::min(1.0, static_cast<double>(columns) * std::erfc(largest / std::sqrt(2.0)));
+}
+
+void add_signals(const Predictor& predictor, const Library& library, const Found& found, Explanation& e) {
+  const Prepared& data = predictor.data();
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
+    if (!data.has(chain)) continue;
+    const Label label = label_of(data, chain);
+    SignalGap s;
+    s.signal = label.signal;
+    s.unit = label.unit;
+    if (s.signal == e.gap.signal) {  // as the gap has it, with what was found at the recording's rate
+      s.rmse = e.gap.before;
+      s.after = e.gap.after;
+    } else {
+      s.rmse = label.scale * raw_residual(predictor, found.baseline.model, chain).rms();
+      s.after = found.added.empty() ? s.rmse
+                                    : label.scale * raw_residual(predictor, found.model.model, chain).rms();
+    }
+    const auto c = static_cast<std::size_t>(chain);
+    s.noise_floor = label.scale * found.floors.white[c];
+    s.floor_from = found.floors.from[c].empty() ? "differences" : found.floors.from[c];
+    s.p_value = chain_p_value(found, library, chain);
+    e.signals.push_back(std::move(s));
+  }
+}
+
+void add_numbers(const Predictor& predictor, const Found& found, Explanation& e) {
+  const Uncertain after = uncertainties(predictor, found.model, found.weights);
+  e.base = after.base;
+  for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
+    if (after.effects[i].size() == e.effects[i].parameters.size())
+      e.effects[i].parameters = after.effects[i];
+  if (found.added.empty()) return;
+  const std::string stood_in_for = e.effects.empty() ? "" : e.effects.front().name;
+  for (std::size_t j = 0; j < predictor.base().size(); ++j) {
+    const BaseParameter& b = predictor.base()[j];
+    BaseChange change;
+    change.name = b.name;
+    change.unit = b.unit;
+    change.before = found.baseline.model.base[j] / b.si_per_unit;
+    change.after = found.model.model.base[j] / b.si_per_unit;
+    const double moved = std::abs(change.after - change.before);
+    const bool beyond_error = !std::isfinite(after.base[j].std_error) || moved > after.base[j].std_error;
+    if (moved > kWorthTelling * std::abs(change.before) && beyond_error)
+      change.sentence = change_sentence(change, stood_in_for);
+    e.base_changes.push_back(std::move(change));
+  }
+}
+
+void add_waterfall(const Predictor& predictor, const Library& library, const Found& found, const Proof& proof,
+                   Chain chain, Explanation& e) {
+  const double scale = label_of(predictor.data(), chain).scale;
+  e.waterfall.insert(e.waterfall.begin(), {"baseline", e.gap.before, e.gap.heldout_before});
+  std::vector<WaterfallStep> steps;
+  Fit fit = found.baseline;
+  for (std::size_t k = 0; k < found.added.size(); ++k) {
+    const bool last = k + 1 == found.added.size();
+    if (!last) {
+      const Trial& trial = found.steps[k].trials.front();
+      const Active active{&library.hypotheses[static_cast<std::size_t>(found.added[k])], trial.values};
+      fit = refit(predictor, fit, {active}, found.weights, 4);
+    }
+    const ModelPoint& model = last ? found.model.model : fit.model;
+    WaterfallStep step;
+    step.label = library.hypotheses[static_cast<std::size_t>(found.added[k])].info().term;
+    step.rmse = scale * raw_residual(predictor, model, chain).rms();
+    if (proof.runs() > 0) step.heldout_rmse = scale * proof.residual(model, chain).rms();
+    steps.push_back(std::move(step));
+  }
+  e.waterfall.insert(e.waterfall.begin() + 1, steps.begin(), steps.end());
+}
+
+std::string missed(const Explanation& e) {
+  const Gap& gap = e.gap;
+  std::string text = fmt::format("{}: the baseline misses {}", upper_first(gap.signal),
+                                 with_unit(gap.before, gap.unit));
+  if (std::isfinite(gap.noise_floor))
+    text += fmt::format(" against a floor of {}", with_unit(gap.noise_floor, gap.unit));
+  return text + " (" + p_in_words(e.p_value) + ").";
+}
+
+std::string closing(const Explanation& e) {
+  const Gap& gap = e.gap;
+  const bool heldout = std::isfinite(gap.heldout_before) && std::isfinite(gap.heldout_after);
+  const double before = heldout ? gap.heldout_before : gap.before;
+  const double after = heldout ? gap.heldout_after : gap.after;
+  return fmt::format("{} → {}{}", rounded(before), with_unit(after, gap.unit),
+                     heldout ? " on held-out runs" : " on the fitted runs (none was held out)");
+}
+
+std::vector<std::string> terms_of(const std::vector<Candidate>& candidates, std::size_t most) {
+  std::vector<std::string> words;
+  for (const Candidate& c : candidates) {
+    if (words.size() == most) {
+      words.push_back("others");
+      break;
+    }
+    words.push_back(c.name);
+  }
+  return words;
+}
+
+std::string largest_hidden(const Explanation& e) {
+  if (e.could_hide.empty()) return "";
+  const CouldHide& most = e.could_hide.front();
+  return fmt::format(" What could hide most is {}, up to {}.", most.id, with_unit(most.size, most.unit));
+}
+
+}  // namespace
+
+std::string change_sentence(const BaseChange& change, const std::string& effect) {
+  const double ratio = std::abs(change.after) / std::abs(change.before);
+  const std::string because = effect.empty() ? "" : ": it had stood in for " + effect;
+  if (change.after * change.before < 0)
+    return fmt::format("{} changed its sign, from {} to {}{}.", change.name, rounded(change.before),
+                       with_unit(change.after, change.unit), because);
+  return fmt::format("{} {} by {:.0f} %{}.", change.name, ratio < 1 ? "fell" : "rose",
+                     100 * std::abs(ratio - 1), because);
+}
+
+std::string summary_of(const Explanation& e) {
+  switch (e.verdict) {
+    case Verdict::kNone:
+      return fmt::format(
+          "Nothing is missing: what the model leaves of the {}, {}, cannot be told from noise ({}).{}",
+          e.gap.signal, with_unit(e.gap.before, e.gap.unit), p_in_words(e.p_value), largest_hidden(e));
+    case Verdict::kImmaterial:
+      return fmt::format(
+          "Something is there ({}), but too small against the noise floor of {} to matter; nothing was "
+          "added.{}",
+          p_in_words(e.p_value), with_unit(e.gap.noise_floor, e.gap.unit), largest_hidden(e));
+    case Verdict::kUnknown: {
+      std::string text = missed(e);
+      if (e.effects.empty()) {
+        text += " No effect of the catalogue explains it";
+      } else {
+        text += fmt::format(" {} closes part of it ({}), but something significant is left that no effect of "
+                            "the catalogue explains",
+                            upper_first(joined(terms_of(e.effects, 3))), closing(e));
+      }
+      if (e.unknown && !e.unknown->depends_on.empty())
+        text += "; it depends on " + joined(e.unknown->depends_on);
+      return text + ".";
+    }
+    case Verdict::kNamed: {
+      if (e.effects.empty()) return missed(e);
+      std::string text = missed(e);
+      if (e.effects.size() == 1) {
+        text += fmt::format(" {}, {}, closes it: {}.", upper_first(e.effects.front().name),
+                            numbers_of(e.effects.front()), closing(e));
+      } else {
+        text += fmt::format(" {} close it together: {}.", upper_first(joined(terms_of(e.effects, 4))),
+                            closing(e));
+      }
+      const BaseChange* largest = nullptr;
+      double most = 0;
+      for (const BaseChange& change : e.base_changes) {
+        const double moved = std::abs(change.after - change.before) / std::abs(change.before);
+        if (change.sentence.empty() || moved <= most) continue;
+        largest = &change;
+        most = moved;
+      }
+      if (largest != nullptr) text += " " + largest->sentence;
+      return text;
+    }
+    case Verdict::kFamily:
+    case Verdict::kNotSeparable: {
+      std::vector<std::string> names = terms_of(e.effects, 3), rivals = terms_of(e.alternatives, 3);
+      std::string text = missed(e);
+      if (names.empty()) return text + " These data cannot tell what is missing.";
+      text += fmt::format(" {} closes it ({}), but {} cannot be ruled out{}", upper_first(joined(names)),
+                          closing(e), joined(rivals),
+                          e.verdict == Verdict::kFamily ? ", all of one kind" : "");
+      if (!e.alternatives.empty())
+        text += fmt::format(": {} fits only {} sigma worse", e.alternatives.front().name,
+                            rounded(std::max(0.0, e.alternatives.front().behind_best), 2));
+      return text + ".";
+    }
+  }
+  return {};
+}
+
+void describe(const Predictor& predictor, const Library& library, const Found& found, const Proof& proof,
+              const ExplainOptions& options, Explanation& e) {
+  const Chain chain = chain_of(predictor.data(), e.gap.signal);
+  add_numbers(predictor, found, e);
+  add_signals(predictor, library, found, e);
+  add_waterfall(predictor, library, found, proof, chain, e);
+  if (options.traces) {
+    for (const bool heldout : {true, false}) {
+      std::vector<RunTrace> traces =
+          heldout ? proof.traces(found.baseline.model, found.model.model, chain, kTracePoints)
+                  : traces_of(predictor, found.baseline.model, found.model.model, chain, false, kTracePoints);
+      for (RunTrace& t : traces) e.traces.push_back(std::move(t));
+    }
+  }
+  add_evidence(predictor, library, found, e);
+  e.summary = summary_of(e);
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,26 @@
+/// @file
+/// What chains and subsystems are called and in which unit they are told; numbers as a person would write them.
+///
+/// Threads: pure. Errors: none. Source: docs/notation.md.
+#pragma once
+
+#include <string>
+
+#include "isac/explain/prepared.hpp"
+#include "isac/models/effect_types.hpp"
+
+namespace isac::explain {
+
+struct Label {
+  std::string signal, unit;
+  double scale = 1;  ///< from SI to `unit`
+};
+[[nodiscard]] Label label_of(const Prepared& data, Chain chain);
+[[nodiscard]] const char* subsystem_name(models::Subsystem where) noexcept;
+/// Three significant digits, without a power of ten where four zeros do.
+[[nodiscard]] std::string rounded(double value, int digits = 3);
+/// "T_c = 0.0098 ± 0.0004 N m" (standard error).
+[[nodiscard]] std::string with_error(const std::string& name, double value, double error,
+                                     const std::string& unit);
+
+}  // namespace isac::explain

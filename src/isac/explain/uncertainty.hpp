@@ -1,0 +1,26 @@
+/// @file
+/// Standard errors and 95 % intervals of every number of a fitted model, which hold under coloured noise.
+///
+///   V = H⁻¹ (Σ_b ũ_b ũ_bᵀ) H⁻¹,  H = JᵀJ,  u_b = Σ_{i∈b} J_i r_i   (CR2, Student's t by Bell and McCaffrey)
+///
+/// J holds the sensitivities of all that was fitted, tolerances and resting angles among them, so an error contains what the
+/// data cannot tell of these. A number at its bound has no error (NaN).
+/// Units: reporting units. Threads: pure. Errors: none; a singular H gives NaN.
+/// Source: estimate/block_covariance.hpp; docs/derivations/explain.md.
+#pragma once
+
+#include <vector>
+
+#include "isac/core/estimated.hpp"
+#include "isac/explain/search.hpp"
+
+namespace isac::explain {
+
+struct Uncertain {
+  std::vector<Estimated> base;                  ///< as Predictor::base()
+  std::vector<std::vector<Estimated>> effects;  ///< as Found::added, parameter by parameter
+};
+
+[[nodiscard]] Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weights& weights);
+
+}  // namespace isac::explain

@@ -1,0 +1,159 @@
+#include "isac/explain/unknown.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "isac/core/units.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr std::size_t kTried = 24;     // columns that enter the selection, best first
+constexpr double kWorthTaking = 0.10;  // of the first column's gain
+constexpr std::size_t kMostTaken = 3;
+constexpr int kBins = 24;
+
+struct Entry {
+  std::size_t column;
+  Eigen::VectorXd rows;
+};
+
+/// What the picture's abscissa is, for a variable of the dictionary.
+double abscissa(const PreparedRun& run, std::size_t k, const std::string& variable) {
+  if (variable == "angle" || variable == "memory") return run.angle.empty() ? kNotKnown : run.angle[k];
+  if (variable == "velocity" || variable == "direction")
+    return run.velocity.empty() ? kNotKnown : run.velocity[k];
+  if (variable == "time") return run.day_offset + run.time[k];
+  if (!run.has_pressure) return kNotKnown;
+  const double p1 = run.pressure[0][k] / kPascalPerKgfCm2, p2 = run.pressure[1][k] / kPascalPerKgfCm2;
+  return variable == "mean_pressure" ? 0.5 * (p1 + p2) : 0.5 * (p2 - p1);
+}
+
+const char* unit_of(const std::string& variable) {
+  if (variable == "angle" || variable == "memory") return "rad";
+  if (variable == "velocity" || variable == "direction") return "rad/s";
+  return variable == "time" ? "s" : "kg/cm2";
+}
+
+void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
+  const Prepared& data = place.predictor->data();
+  double low = 1e300, high = -1e300;
+  for (const Row& row : data.rows) {
+    if (row.chain != chain) continue;
+    const double x = abscissa(data.runs[row.run], row.sample, unknown.variable);
+    if (!std::isfinite(x)) continue;
+    low = std::min(low, x);
+    high = std::max(high, x);
+  }
+  if (!(high > low)) return;
+  const double scale = place.weights->sigma[static_cast<int>(chain)] /
+                       (chain == Chain::kPressure1 || chain == Chain::kPressure2 ? kPascalPerKgfCm2 : 1.0);
+  struct Sum {
+    double total = 0, count = 0;
+  };
+  std::vector<std::map<unsigned, Sum>> bins(kBins);  // by block
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const Row& row = data.rows[i];
+    if (row.chain != chain) continue;
+    const double x = abscissa(data.runs[row.run], row.sample, unknown.variable);
+    if (!std::isfinite(x)) continue;
+    const auto bin =
+        std::min<std::size_t>(kBins - 1, static_cast<std::size_t>((x - low) / (high - low) * kBins));
+    Sum& s = bins[bin][row.block];
+    s.total -= place.residual[static_cast<Eigen::Index>(i)] * scale;  // measured − predicted
+    s.count += 1;
+  }
+  for (int b = 0; b < kBins; ++b) {
+    const auto& blocks = bins[static_cast<std::size_t>(b)];
+    double total = 0, count = 0, scatter = 0;
+    for (const auto& [block, s] : blocks) {
+      total += s.total;
+      count += s.count;
+    }
+    if (blocks.size() < 3) continue;  // too thin to draw
+    const double mean = total / count;
+    for (const auto& [block, s] : blocks) scatter += (s.total - s.count * mean) * (s.total - s.count * mean);
+    const double m = static_cast<double>(blocks.size());
+    unknown.at.push_back(low + (b + 0.5) * (high - low) / kBins);
+    unknown.shape.push_back(mean);
+    unknown.band.push_back(1.96 * std::sqrt(scatter * m / (m - 1)) / count);
+  }
+}
+
+}  // namespace
+
+Unknown describe_unknown(const Around& place, const Screen& screen) {
+  Unknown unknown;
+  const Prepared& data = place.predictor->data();
+  const Dictionary generic(data);
+  // Of each column: its gain if it were alone. The best of them decides the chain.
+  std::vector<std::pair<double, std::size_t>> order;
+  std::size_t index = 0;
+  for (const Column& c : screen.columns) {
+    if (c.hypothesis >= 0) continue;
+    if (c.norm2 > 1e-9 && c.T >= 0.7 * screen.limit) order.emplace_back(c.score * c.score / c.norm2, index);
+    ++index;
+  }
+  if (order.empty()) return unknown;
+  std::sort(order.rbegin(), order.rend());
+  const Chain chain = generic.chain(order.front().second);
+  static constexpr const char* kSubsystem[] = {"muscle", "pcu", "pcu", "joint"};
+  static constexpr const char* kSignal[] = {"torque", "p1", "p2", "motion"};
+  unknown.subsystem = kSubsystem[static_cast<int>(chain)];
+  unknown.signal = kSignal[static_cast<int>(chain)];
+  unknown.unit =
+      chain == Chain::kPressure1 || chain == Chain::kPressure2 ? "kg/cm2" : data.baseline.output_unit;
+
+  std::vector<Entry> entries;
+  for (const auto& [gain, column] : order) {
+    if (entries.size() >= kTried) break;
+    if (generic.chain(column) == chain) entries.push_back({column, place.project(generic.rows(column))});
+  }
+  Eigen::VectorXd residual = -place.residual;
+  double first = 0, taken = 0;
+  std::set<std::string> depends, tried;
+  for (std::size_t round = 0; round < kMostTaken; ++round) {
+    std::size_t best = entries.size();
+    double best_gain = 0;
+    for (std::size_t e = 0; e < entries.size(); ++e) {
+      const double norm2 = entries[e].rows.squaredNorm();
+      if (norm2 < 1e-9) continue;
+      const double score = entries[e].rows.dot(residual);
+      if (score * score / norm2 <= best_gain) continue;
+      best_gain = score * score / norm2;
+      best = e;
+    }
+    if (best == entries.size()) break;
+    if (round == 0) first = best_gain;
+    if (best_gain < kWorthTaking * first || best_gain < 12 * screen.noise_unit) break;
+    taken += best_gain;
+    const std::vector<std::string> variables = generic.variables(entries[best].column);
+    if (round == 0) unknown.variable = variables.empty() ? "angle" : variables.back();
+    depends.insert(variables.begin(), variables.end());
+    const Eigen::VectorXd unit = entries[best].rows.normalized();
+    residual -= unit.dot(residual) * unit;
+    for (Entry& e : entries) e.rows -= unit.dot(e.rows) * unit;
+  }
+  for (std::size_t c = 0; c < generic.size(); ++c)
+    if (generic.chain(c) == chain)
+      for (const std::string& v : generic.variables(c))
+        if (depends.count(v) == 0) tried.insert(v);
+  unknown.depends_on.assign(depends.begin(), depends.end());
+  unknown.independent.assign(tried.begin(), tried.end());
+  // Of what is explainable: the chain's squares beyond those of its noise.
+  double squares = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (data.rows[i].chain == chain)
+      squares += residual[static_cast<Eigen::Index>(i)] * residual[static_cast<Eigen::Index>(i)];
+  double rows = 0;
+  for (const Row& row : data.rows) rows += row.chain == chain ? 1.0 : 0.0;
+  const double left = std::max(0.0, squares - rows);
+  unknown.share = taken > 0 ? taken / (taken + left) : 0.0;
+  unknown.variable_unit = unit_of(unknown.variable);
+  fill_shape(place, chain, unknown);
+  return unknown;
+}
+
+}  // namespace isac::explain

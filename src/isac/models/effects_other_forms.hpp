@@ -1,0 +1,174 @@
+/// @file
+/// Other forms that effects of the catalogue take on real rigs: each has an id of its own and `reported_as`, the effect whose
+/// form it is, under whose id a search names it.
+///
+///   leak_per_muscle       each muscle leaks at its own rate
+///   crosstalk_per_muscle  either muscle's pressure moves the other's reference by its own share
+///   crosstalk_direct      either muscle's pressure moves the other's at once, without the valve's lag
+///   valve_stiction        the valve does not answer errors below its band, and answers larger ones in full
+///   pressure_creep        the force follows a change of pressure late (bladder): a torque with a slow state of Δp
+///   maxwell_slip          one elasto-plastic element: a spring that slips at T_h, with corners instead of Dahl's curve
+///
+/// Conventions, units and promises as in effects_torque.hpp and effects_pcu.hpp. Source: docs/derivations/effects.md.
+#pragma once
+
+#include <cmath>
+
+#include "isac/models/effect_types.hpp"
+#include "isac/models/scalar.hpp"
+
+namespace isac::models::effect {
+
+struct LeakPerMuscle {
+  static constexpr EffectInfo kInfo{
+      .id = "leak_per_muscle",
+      .term = "leak of either muscle",
+      .where = Subsystem::kPcu,
+      .equation = "p_i' -> p_i' - k_i p_i",
+      .parameter_count = 2,
+      .parameters = {{"k1", "1/s", 1, 0, 5, 0.1}, {"k2", "1/s", 1, 0, 5, 0.1}},
+      .state_count = 0,
+      .torque_term = false,
+      .linear = true,
+      .confused_with = "leak, pressure_sensor_gain",
+      .told_apart_by = "one muscle stays below its reference, the other does not",
+      .hook = Hook::kPressureRate,
+      .reported_as = "leak"};
+  template <class S>
+  static void pressure_rate(const S* q, const ValvePoint<S>& x, const S*, S* v) noexcept {
+    for (int i = 0; i < 2; ++i) v[i] = v[i] - q[i] * x.pressure[i];
+  }
+};
+
+struct CrosstalkPerMuscle {
+  static constexpr EffectInfo kInfo{
+      .id = "crosstalk_per_muscle",
+      .term = "crosstalk of the references, either way",
+      .where = Subsystem::kPcu,
+      .equation = "u1 -> u1 + x12 p2, u2 -> u2 + x21 p1",
+      .parameter_count = 2,
+      .parameters = {{"x12", "-", 1, -0.2, 0.2, 0.02}, {"x21", "-", 1, -0.2, 0.2, 0.02}},
+      .state_count = 0,
+      .torque_term = false,
+      .linear = true,
+      .confused_with = "crosstalk, pressure_gain_error",
+      .told_apart_by = "move one muscle only: one of the others answers",
+      .hook = Hook::kCommand,
+      .reported_as = "crosstalk"};
+  template <class S>
+  static void command(const S* q, const ValvePoint<S>& x, const S*, S* u) noexcept {
+    u[0] = u[0] + q[0] * x.pressure[1];
+    u[1] = u[1] + q[1] * x.pressure[0];
+  }
+};
+
+/// p_i = (lag of u_i) + x p_j: its rate has the reference's share and that of the other's rate.
+struct CrosstalkDirect {
+  static constexpr EffectInfo kInfo{
+      .id = "crosstalk_direct",
+      .term = "crosstalk of the pressures, without lag",
+      .where = Subsystem::kPcu,
+      .equation = "p1 -> p1 + x12 p2, p2 -> p2 + x21 p1",
+      .parameter_count = 2,
+      .parameters = {{"x12", "-", 1, -0.2, 0.2, 0.02}, {"x21", "-", 1, -0.2, 0.2, 0.02}},
+      .state_count = 0,
+      .torque_term = false,
+      .linear = true,
+      .confused_with = "crosstalk, pressure_sensor_gain",
+      .told_apart_by = "the other answers at once",
+      .hook = Hook::kPressureRate,
+      .reported_as = "crosstalk"};
+  template <class S>
+  static void pressure_rate(const S* q, const ValvePoint<S>& x, const S*, S* v) noexcept {
+    const S v0 = v[0], v1 = v[1];
+    v[0] = v0 + q[0] * (x.pressure[1] / x.lag + v1);
+    v[1] = v1 + q[1] * (x.pressure[0] / x.lag + v0);
+  }
+};
+
+struct ValveStiction {
+  static constexpr EffectInfo kInfo{
+      .id = "valve_stiction",
+      .term = "valve that does not answer small errors",
+      .where = Subsystem::kPcu,
+      .equation = "u -> p where |u - p| < d",
+      .parameter_count = 1,
+      .parameters = {{"d", "kg/cm2", kPascalPerKgfCm2, 0, kPascalPerKgfCm2, 0.03 * kPascalPerKgfCm2}},
+      .state_count = 0,
+      .torque_term = false,
+      .linear = false,
+      .confused_with = "valve_deadband, valve_hysteresis",
+      .told_apart_by = "large errors are answered in full",
+      .hook = Hook::kCommand,
+      .reported_as = "valve_deadband"};
+  template <class S>
+  static void command(const S* q, const ValvePoint<S>& x, const S*, S* u) noexcept {
+    for (int i = 0; i < 2; ++i)
+      if (magnitude<S>(u[i] - x.pressure[i]) < q[0]) u[i] = x.pressure[i];
+  }
+};
+
+struct PressureCreep {
+  static constexpr double kUnit = 1.0 / kPascalPerKgfCm2;
+  static constexpr EffectInfo kInfo{
+      .id = "pressure_creep",
+      .term = "force that follows the pressure late",
+      .where = Subsystem::kMuscle,
+      .equation = "-b r (dp - c), c' = (dp - c)/tau",
+      .parameter_count = 2,
+      .parameters = {{"b", "N cm2/kg", kUnit, -100 * kUnit, 100 * kUnit, 5 * kUnit},
+                     {"tau", "s", 1, 0.5, 2000, 10, kAnyValue}},
+      .state_count = 1,
+      .torque_term = true,
+      .linear = false,
+      .confused_with = "creep, thermal_drift",
+      .told_apart_by = "follows every change of the pressure, also when clamped",
+      .reported_as = "creep"};
+  template <class S>
+  static S torque(const S* q, const JointPoint<S>& x, const S* z) noexcept {
+    return -(q[0] * x.wheel_radius * (x.delta_pressure - z[0]));
+  }
+  template <class S>
+  static void derivative(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    dz[0] = (x.delta_pressure - z[0]) / q[1];
+  }
+  template <class S>
+  static void rest(const S*, const JointPoint<S>& x, S* z) noexcept {
+    z[0] = x.delta_pressure;
+  }
+};
+
+struct MaxwellSlip {
+  static constexpr EffectInfo kInfo{
+      .id = "maxwell_slip",
+      .term = "hysteresis with corners (one Maxwell-slip element)",
+      .where = Subsystem::kMuscle,
+      .equation = "-T_h z, z' = w/phi_s while |z| < 1",
+      .parameter_count = 2,
+      .parameters = {{"T_h", "N m", 1, 0, 1e4, 0.2}, {"phi_s", "rad", 1, 1e-3, 2, 0.05, kAnyValue}},
+      .state_count = 1,
+      .torque_term = true,
+      .linear = false,
+      .confused_with = "hysteresis, coulomb_friction",
+      .told_apart_by = "minor loops close",
+      .dissipative = true,
+      .reported_as = "hysteresis"};
+  template <class S>
+  static S torque(const S* q, const JointPoint<S>&, const S* z) noexcept {
+    return -(q[0] * clamp<S>(z[0], S(-1.0), S(1.0)));
+  }
+  template <class S>
+  static void derivative(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    const bool slips = (z[0] >= S(1.0) && x.velocity > S(0.0)) || (z[0] <= S(-1.0) && x.velocity < S(0.0));
+    dz[0] = slips ? S(0.0) : S(x.velocity / q[1]);
+  }
+  template <class S>
+  static void rest(const S*, const JointPoint<S>&, S* z) noexcept {
+    z[0] = S(0.0);
+  }
+};
+
+using OtherForms =
+    EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction, PressureCreep, MaxwellSlip>;
+
+}  // namespace isac::models::effect
