@@ -21,7 +21,8 @@ namespace {
 constexpr std::size_t kRowsWanted = 3000;  // of residuals; the command is never thinned
 constexpr int kParameters = 7;             // log K, log T_C, log T_J, log ζ, L/scale, φ_0/size, load/reach
 constexpr int kFree = 5;
-constexpr double kAtTheNoise = 1.05;  // rms of the residual over the angle's scatter at rest
+constexpr double kAsGood = 1.01;    // times the least sum of squares
+constexpr double kDisagree = 0.04;  // in K_crit, of two plants that fit as well as each other
 using Vector = std::array<double, kParameters>;
 
 struct Problem {
@@ -300,6 +301,19 @@ std::string refusal_of(const PlantFit& fit, const PlantFitOptions& options) {
   return {};
 }
 
+/// Plants that fit as well as the best but swing at another gain: then the record does not tell.
+std::string disagreement_of(const Problem& problem, const Solution& best,
+                            const std::vector<Solution>& solutions) {
+  const auto critical = ultimate(plant_loop(plant_of(problem, best.x.data())));
+  for (const Solution& s : solutions) {
+    if (!std::isfinite(s.cost) || s.cost > kAsGood * best.cost) continue;
+    const auto other = ultimate(plant_loop(plant_of(problem, s.x.data())));
+    if (critical && other && std::abs(other->gain / critical->gain - 1) < kDisagree) continue;
+    return "two plants fit the record equally well and differ in K_crit; use the relay, or excite more";
+  }
+  return {};
+}
+
 }  // namespace
 
 ExperimentRecord even_record(const ExperimentRecord& record) {
@@ -339,12 +353,11 @@ const Estimated& value_of(const PlantFit& fit, const std::string& name) {
 PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& options) {
   const Problem problem = problem_of(record, options);
   Solution best;
+  std::vector<Solution> solutions;
   for (const Start& start : starts_of(problem)) {
-    Solution s = solve(problem, start.x);
-    if (std::isfinite(s.cost) && s.cost < best.cost) best = std::move(s);
-    // Nothing but the noise at rest is left over: no other start can do better.
-    const double left = problem.size * std::sqrt(2 * best.cost / static_cast<double>(problem.residuals()));
-    if (best.converged && left < kAtTheNoise * options.noise) break;
+    solutions.push_back(solve(problem, start.x));
+    const Solution& s = solutions.back();
+    if (std::isfinite(s.cost) && s.cost < best.cost) best = s;
   }
   PlantFit fit;
   fit.record = problem.record;
@@ -371,6 +384,7 @@ PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& option
     fit.parameters.push_back(estimated(fact, problem, best.x, spread));
   for (const Fact& fact : derived_facts()) fit.derived.push_back(estimated(fact, problem, best.x, spread));
   fit.refusal = refusal_of(fit, options);
+  if (fit.refusal.empty()) fit.refusal = disagreement_of(problem, best, solutions);
   return fit;
 }
 
