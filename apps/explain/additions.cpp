@@ -27,9 +27,14 @@ std::string joint_name(const std::string& name, const std::vector<std::string>& 
   return name;
 }
 
+/// The entry of the catalogue whose parameters these are.
+const std::string& form_of(const explain::Candidate& effect) {
+  return effect.form.empty() ? effect.id : effect.form;
+}
+
 const Estimated* delay_of(const explain::Explanation& answer) {
   for (const explain::Candidate& effect : answer.effects)
-    if (effect.id == "dead_time" && !effect.parameters.empty()) return &effect.parameters.front();
+    if (form_of(effect) == "dead_time" && !effect.parameters.empty()) return &effect.parameters.front();
   return nullptr;
 }
 
@@ -92,7 +97,7 @@ record::Params params_of(const explain::Explanation& answer, const ExplainInputs
   if (record::ParamsSection valve = valve_of(answer, inputs); !valve.values.empty())
     params.sections.push_back(std::move(valve));
   for (const explain::Candidate& effect : answer.effects) {
-    record::ParamsSection section = section_of("effects", effect.id, inputs);
+    record::ParamsSection section = section_of("effects", form_of(effect), inputs);
     section.values = effect.parameters;
     params.sections.push_back(std::move(section));
   }
@@ -102,7 +107,7 @@ record::Params params_of(const explain::Explanation& answer, const ExplainInputs
 std::vector<std::string> compensation_of(const explain::Explanation& answer) {
   std::vector<std::string> sentences;
   for (const explain::Candidate& effect : answer.effects) {
-    const int index = models::find_effect(effect.id);
+    const int index = models::find_effect(form_of(effect));
     if (index < 0) continue;
     std::string name = effect.name;
     if (!name.empty() && name[0] >= 'a' && name[0] <= 'z') name[0] = static_cast<char>(name[0] - 'a' + 'A');
@@ -111,7 +116,7 @@ std::vector<std::string> compensation_of(const explain::Explanation& answer) {
       sentences.push_back(
           name +
           ": the controller feeds it forward on the desired motion, once the parameters are exported.");
-    } else if (effect.id == "dead_time") {
+    } else if (form_of(effect) == "dead_time") {
       sentences.push_back(name +
                           ": the controller's predictor carries it, as the dead time of the valve unit.");
     } else {

@@ -50,6 +50,7 @@ Json candidate_of(const Candidate& candidate) {
   for (const explain::Evidence& evidence : candidate.evidence)
     (evidence.supports ? supports : against).push_back(evidence.sentence);
   return {{"id", candidate.id},
+          {"form", candidate.form.empty() ? candidate.id : candidate.form},
           {"name", candidate.name},
           {"subsystem", candidate.subsystem},
           {"equation", text_or_null(candidate.equation)},
