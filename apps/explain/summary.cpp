@@ -26,13 +26,13 @@ std::size_t columns_of(int stream, std::size_t otherwise) {
 }
 
 /// `text` in lines of at most `width` glyphs, each after the first indented.
-std::string wrapped(const std::string& text, std::size_t width) {
+std::string wrapped(const std::string& text, std::size_t width, std::size_t indent) {
   std::string out, line;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find(' ', begin), text.size());
     const std::string word = text.substr(begin, end - begin);
     if (!line.empty() && report::glyphs(line) + 1 + report::glyphs(word) > width) {
-      out += line + "\n" + std::string(kMargin, ' ');
+      out += line + "\n" + std::string(indent, ' ');
       line.clear();
     }
     line += (line.empty() ? "" : " ") + word;
@@ -45,7 +45,7 @@ class Sheet {
  public:
   Sheet() : width_(std::clamp<std::size_t>(columns_of(STDOUT_FILENO, 100), 40, 120) - kMargin) {}
   void row(const char* label, const std::string& text) const {
-    if (!text.empty()) fmt::print("{:<{}}{}\n", label, kMargin, wrapped(text, width_));
+    if (!text.empty()) fmt::print("{:<{}}{}\n", label, kMargin, wrapped(text, width_, kMargin));
   }
   [[nodiscard]] std::size_t width() const { return width_; }
 
@@ -116,7 +116,7 @@ void print_explanation(const explain::Explanation& e, const std::vector<std::str
   const Sheet sheet;
   const bool terminal = ::isatty(STDOUT_FILENO) == 1;
   fmt::print("{}{}{}\n\n", terminal ? "\033[1m" : "",
-             wrapped(report::verdict_sentence(e), sheet.width() + kMargin - 11), terminal ? "\033[0m" : "");
+             wrapped(report::verdict_sentence(e), sheet.width() + kMargin, 0), terminal ? "\033[0m" : "");
   sheet.row("gap", report::gap_sentence(e));
   for (std::size_t i = 0; i < std::min<std::size_t>(3, e.where.size()); ++i)
     sheet.row(i == 0 ? "where" : "", report::region_sentence(e.where[i]));

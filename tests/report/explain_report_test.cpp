@@ -142,6 +142,14 @@ TEST(ExplainFigures, speak_of_position_and_metres_for_a_linear_axis) {
   EXPECT_EQ(figure.panels[1].x.label, "Position x");
 }
 
+TEST(ExplainWords, say_why_there_is_no_proof_on_held_out_runs) {
+  Explanation e = named_sample();
+  e.gap.heldout_before = isac::explain::kNotKnown;
+  EXPECT_NE(gap_sentence(e).find("the held-out ones do not show it"), std::string::npos) << gap_sentence(e);
+  e.heldout_runs = 0;
+  EXPECT_NE(gap_sentence(e).find("none was held out"), std::string::npos) << gap_sentence(e);
+}
+
 TEST(ExplainWords, never_say_that_something_is_certain) {
   EXPECT_EQ(percent(0.9999), "> 99 %");
   EXPECT_EQ(percent(1), "> 99 %");

@@ -87,10 +87,12 @@ std::string gap_sentence(const Explanation& e) {
   const double before = heldout ? gap.heldout_before : gap.before,
                after = heldout ? gap.heldout_after : gap.after;
   if (!std::isfinite(before)) return {};
-  std::string text = heldout
-                         ? "On " + whole(static_cast<double>(e.heldout_runs)) + " held-out " +
-                               (e.heldout_runs == 1 ? "run" : "runs") + ", which nothing was fitted to, the "
-                         : "On the fitted runs (none was held out) the ";
+  std::string text =
+      heldout
+          ? "On " + whole(static_cast<double>(e.heldout_runs)) + " held-out " +
+                (e.heldout_runs == 1 ? "run" : "runs") + ", which nothing was fitted to, the "
+          : std::string("On the fitted runs (") +
+                (e.heldout_runs > 0 ? "the held-out ones do not show it" : "none was held out") + ") the ";
   text += signal_in_words(gap.signal) + " is " + with_unit(before, gap.unit) + " rms off";
   if (std::isfinite(after) && !e.effects.empty())
     text += " before and " + with_unit(after, gap.unit) + " after";
