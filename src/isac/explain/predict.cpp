@@ -38,11 +38,19 @@ class Memory {
     middle.angle = 0.5 * (from.angle + to.angle);
     middle.velocity = 0.5 * (from.velocity + to.velocity);
     if (count_ == 1) {
-      const double f = rate(middle, z_[0]);
-      constexpr double kNudge = 1e-6;
-      const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * dt;
-      const double phi = std::abs(slope) < 1e-6 ? 1 + 0.5 * slope : std::expm1(slope) / slope;
-      z_[0] += dt * f * phi;
+      // A state that slips at its limit must not run past it within a sample.
+      const double first = rate(middle, z_[0]);
+      const int parts =
+          active_.hypothesis->dry ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
+      const double h = dt / parts;
+      for (int part = 0; part < parts; ++part) {
+        const double f = rate(middle, z_[0]);
+        constexpr double kNudge = 1e-6;
+        const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * h;
+        const double phi =
+            std::abs(slope) < 1e-6 ? 1 + 0.5 * slope : std::expm1(std::min(slope, 5.0)) / slope;
+        z_[0] += h * f * phi;
+      }
       return;
     }
     const auto f = [&](const double* z, const JointPoint<double>& x, double* dz) {

@@ -47,7 +47,8 @@ class Projected final : public ceres::CostFunction {
       const auto i = static_cast<std::size_t>(k);
       // Onsets and widths move events from sample to sample: a longer step sees more of them.
       const bool shape = std::isnan(hypothesis_.info().parameters[free_[i]].null_value);
-      double step = shape ? 2e-3 : 1e-4;
+      const bool memory = hypothesis_.info().state_count > 0;
+      double step = memory ? 1e-2 : shape ? 2e-3 : 1e-4;
       if ((x[i] + step) * scale_[i] > hypothesis_.upper[free_[i]]) step = -step;
       const double kept = x[i];
       x[i] = kept + step;
@@ -113,6 +114,30 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
   for (std::size_t j = 0; j < x.size(); ++j) refined.values[free[j]] = x[j] * scale[j];
   refined.residual = cost->residual_at(x.data());
   refined.loss = refined.residual.squaredNorm();
+  if (hypothesis.info().state_count > 0) {
+    // Events make the loss a staircase on which derivatives mislead: one parameter after another, ever finer.
+    for (const double change : {0.3, 0.1, 0.03, 0.01}) {
+      bool better = true;
+      for (int round = 0; better && round < 3; ++round) {
+        better = false;
+        for (std::size_t j = 0; j < x.size(); ++j)
+          for (const double factor : {1 + change, 1 / (1 + change)}) {
+            std::vector<double> tried = x;
+            tried[j] =
+                std::clamp(x[j] * factor * scale[j], hypothesis.lower[free[j]], hypothesis.upper[free[j]]) /
+                scale[j];
+            Eigen::VectorXd residual = cost->residual_at(tried.data());
+            const double loss = residual.squaredNorm();
+            if (!(loss < refined.loss * (1 - 1e-7))) continue;
+            refined.loss = loss;
+            refined.residual = std::move(residual);
+            x = std::move(tried);
+            better = true;
+          }
+      }
+    }
+    for (std::size_t j = 0; j < x.size(); ++j) refined.values[free[j]] = x[j] * scale[j];
+  }
   return refined;
 }
 

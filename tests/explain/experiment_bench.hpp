@@ -1,0 +1,114 @@
+/// @file
+/// Recordings, the baseline fitted to them, and effects tried in its surroundings: what a designer of experiments is given.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "isac/explain/experiment.hpp"
+#include "tied_data.hpp"
+
+namespace isac::test {
+
+/// Nothing but the initial mean pressure, and pressures that move slowly.
+inline std::vector<explain::PlannedRun> constant_mean_pressure() {
+  return {by_hand(20, 0.35, 0.3), by_hand(20, 0.3, 0.3, 0.8), by_hand(20, 0.4, 3.0),
+          by_hand(20, 0.3, 3.0, -0.8), clamped(16, 0.1, 1.0, 8)};
+}
+
+inline std::vector<explain::PlannedRun> slow_pressures() {
+  return {by_hand(20, 0.35, 0.3), by_hand(20, 0.4, 3.0), clamped(24, 0.1, 0.5, 12)};
+}
+
+struct Bench {
+  explain::Prepared data;
+  explain::Library library;
+  explain::Predictor predictor;
+  explain::Weights weights;
+  explain::Fit stem;
+
+  Bench(const TiedRig& rig, const std::vector<explain::PlannedRun>& runs)
+      : data(explain::prepare(record_all(rig, runs), rig.facts(), {}, 4.0)),
+        library(explain::make_library(data)),
+        predictor(data) {
+    // Of a low-passed row: 0.3 N in both sensors at 19 mm, and 0.004 kg/cm2, through a Gaussian of 6 ms at 500 Hz.
+    weights = {{0.0025, 120, 120, 0.005}};
+    stem = explain::fit_baseline(predictor, library.tolerances, weights);
+  }
+
+  [[nodiscard]] const explain::Hypothesis* find(const std::string& id) const {
+    for (const explain::Hypothesis& h : library.hypotheses)
+      if (h.id() == id) return &h;
+    return nullptr;
+  }
+
+  /// The effect refitted to what `place` has left over, from all of its shapes.
+  [[nodiscard]] static explain::Active fitted(const explain::Around& place, const explain::Hypothesis& h) {
+    explain::Refined best;
+    best.loss = std::numeric_limits<double>::infinity();
+    for (const explain::Values& shape : h.shapes) {
+      explain::Refined now = explain::refine(place, h, shape);
+      if (now.loss < best.loss) best = std::move(now);
+    }
+    return {&h, best.values};
+  }
+
+  [[nodiscard]] explain::Tie tie(const std::vector<std::string>& ids) const {
+    explain::Tie out;
+    out.predictor = &predictor;
+    out.stem = stem;
+    out.weights = weights;
+    const explain::Around place = explain::around(predictor, stem, weights);
+    for (const std::string& id : ids) {
+      const explain::Hypothesis* h = find(id);
+      EXPECT_NE(h, nullptr) << id;
+      if (h != nullptr) out.models.push_back(fitted(place, *h));
+    }
+    return out;
+  }
+
+  /// A tie without noise: `truth` as large as shows by `sigma` beside a refitted baseline, and the rival that mimics it best.
+  [[nodiscard]] std::optional<explain::Tie> tie_between(const std::string& truth, const std::string& rival,
+                                                        double sigma) const {
+    const explain::Hypothesis *t = find(truth), *r = find(rival);
+    if (t == nullptr || r == nullptr) return std::nullopt;
+    explain::Around place = explain::around(predictor, stem, weights);
+    const auto left = [&](const explain::Values& values) {
+      return Eigen::VectorXd(
+          place.project(explain::response(predictor, stem, place.here, {t, values}, weights)));
+    };
+    explain::Active active{t, t->shapes[t->shapes.size() / 2]};
+    // Amplitudes scale together; where an effect has none its shape does (dead times, widths).
+    const auto scaled = [&](double factor) {
+      explain::Values v = active.values;
+      bool any = false;
+      for (std::size_t k = 0; k < v.size(); ++k)
+        if (t->free[k] && t->amplitude[k]) {
+          v[k] *= factor;
+          any = true;
+        }
+      if (!any) v[0] *= factor;
+      return v;
+    };
+    double low = 1e-4, high = 10;
+    if (left(scaled(high)).norm() < sigma) return std::nullopt;
+    for (int i = 0; i < 30; ++i) {
+      const double middle = std::sqrt(low * high);
+      (left(scaled(middle)).norm() < sigma ? low : high) = middle;
+    }
+    active.values = scaled(high);
+    place.residual = -left(active.values);
+    explain::Tie out;
+    out.predictor = &predictor;
+    out.stem = stem;
+    out.weights = weights;
+    out.models = {active, fitted(place, *r)};
+    return out;
+  }
+};
+
+}  // namespace isac::test
