@@ -169,7 +169,7 @@ void add_ranking(Document& page, const std::string& caption, const std::vector<C
                           {"Confidence", true},
                           {"Behind (σ)", true},
                           {"Closes", true},
-                          {reasons ? "Why" : "Refitted as"}}};
+                          {reasons ? "Why, or refitted as" : "Refitted as"}}};
   for (std::size_t i = 0; i < std::min(kMostNear, candidates.size()); ++i) {
     const Candidate& c = candidates[i];
     std::string last = parameters_in_words(c);

@@ -133,7 +133,9 @@ std::string variable_in_words(const std::string& variable) {
                                                          {"angle", "angle φ"},
                                                          {"velocity", "speed φ̇"},
                                                          {"memory", "what happened before"},
-                                                         {"speed", "speed |φ̇|"}};
+                                                         {"speed", "speed |φ̇|"},
+                                                         {"direction", "direction of motion"},
+                                                         {"pressure_rate", "rate of the pressures"}};
   const auto found = kWords.find(variable);
   return found == kWords.end() ? variable : found->second;
 }
