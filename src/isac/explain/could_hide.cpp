@@ -29,6 +29,7 @@ std::vector<CouldHide> could_hide(const Prepared& data, const Library& library, 
                                   std::size_t most) {
   if (found.steps.empty()) return {};
   std::set<std::string> taken;
+  for (const std::string& id : not_testable(library, found)) taken.insert(id);
   for (const int h : found.added) taken.insert(library.hypotheses[static_cast<std::size_t>(h)].id());
   const Screen& screen = found.steps.back().screen;
   std::map<std::string, Bound> bounds;

@@ -47,6 +47,11 @@ Chain chain_of(const Prepared& data, const std::string& signal) {
   return Chain::kTorque;
 }
 
+/// The model of which the explanation tells: nothing was added where nothing was named.
+const Fit& told_model(const Found& found, const Explanation& e) {
+  return e.effects.empty() ? found.baseline : found.model;
+}
+
 /// p-value of the largest score of one chain over all columns that show in it, by the normal tail of each.
 double chain_p_value(const Found& found, const Library& library, Chain chain) {
   if (found.steps.empty()) return 1;
@@ -55,9 +60,8 @@ double chain_p_value(const Found& found, const Library& library, Chain chain) {
   double largest = 0;
   std::size_t columns = 0;
   for (const Column& c : screen.columns) {
-    const unsigned chains = c.hypothesis >= 0
-                                ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
-                                : bit(c.chain);
+    const unsigned chains =
+        c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains : bit(c.chain);
     if (chains != bit(chain)) continue;
     ++columns;
     largest = std::max(largest, c.T);
@@ -79,8 +83,9 @@ void add_signals(const Predictor& predictor, const Library& library, const Found
       s.after = e.gap.after;
     } else {
       s.rmse = label.scale * raw_residual(predictor, found.baseline.model, chain).rms();
-      s.after = found.added.empty() ? s.rmse
-                                    : label.scale * raw_residual(predictor, found.model.model, chain).rms();
+      s.after = e.effects.empty() || found.added.empty()
+                    ? s.rmse
+                    : label.scale * raw_residual(predictor, found.model.model, chain).rms();
     }
     const auto c = static_cast<std::size_t>(chain);
     s.noise_floor = label.scale * found.floors.white[c];
@@ -91,12 +96,12 @@ void add_signals(const Predictor& predictor, const Library& library, const Found
 }
 
 void add_numbers(const Predictor& predictor, const Found& found, Explanation& e) {
-  const Uncertain after = uncertainties(predictor, found.model, found.weights);
+  const Fit& fit = told_model(found, e);
+  const Uncertain after = uncertainties(predictor, fit, found.weights);
   e.base = after.base;
   for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
-    if (after.effects[i].size() == e.effects[i].parameters.size())
-      e.effects[i].parameters = after.effects[i];
-  if (found.added.empty()) return;
+    if (after.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = after.effects[i];
+  if (e.effects.empty() || found.added.empty()) return;
   const std::string stood_in_for = e.effects.empty() ? "" : e.effects.front().name;
   for (std::size_t j = 0; j < predictor.base().size(); ++j) {
     const BaseParameter& b = predictor.base()[j];
@@ -117,6 +122,7 @@ void add_waterfall(const Predictor& predictor, const Library& library, const Fou
                    Chain chain, Explanation& e) {
   const double scale = label_of(predictor.data(), chain).scale;
   e.waterfall.insert(e.waterfall.begin(), {"baseline", e.gap.before, e.gap.heldout_before});
+  if (e.effects.empty()) return;
   std::vector<WaterfallStep> steps;
   Fit fit = found.baseline;
   for (std::size_t k = 0; k < found.added.size(); ++k) {
@@ -138,8 +144,8 @@ void add_waterfall(const Predictor& predictor, const Library& library, const Fou
 
 std::string missed(const Explanation& e) {
   const Gap& gap = e.gap;
-  std::string text = fmt::format("{}: the baseline misses {}", upper_first(gap.signal),
-                                 with_unit(gap.before, gap.unit));
+  std::string text =
+      fmt::format("{}: the baseline misses {}", upper_first(gap.signal), with_unit(gap.before, gap.unit));
   if (std::isfinite(gap.noise_floor))
     text += fmt::format(" against a floor of {}", with_unit(gap.noise_floor, gap.unit));
   return text + " (" + p_in_words(e.p_value) + ").";
@@ -166,6 +172,13 @@ std::vector<std::string> terms_of(const std::vector<Candidate>& candidates, std:
   return words;
 }
 
+/// Standard errors by which a base parameter changed.
+double moved_by(const Explanation& e, const BaseChange& change) {
+  for (const Estimated& b : e.base)
+    if (b.name == change.name && b.std_error > 0) return std::abs(change.after - change.before) / b.std_error;
+  return std::abs(change.after - change.before) / std::abs(change.before);
+}
+
 std::string largest_hidden(const Explanation& e) {
   if (e.could_hide.empty()) return "";
   const CouldHide& most = e.could_hide.front();
@@ -180,6 +193,9 @@ std::string change_sentence(const BaseChange& change, const std::string& effect)
   if (change.after * change.before < 0)
     return fmt::format("{} changed its sign, from {} to {}{}.", change.name, rounded(change.before),
                        with_unit(change.after, change.unit), because);
+  if (!(ratio < 3 && ratio > 1.0 / 3))
+    return fmt::format("{} {} from {} to {}{}.", change.name, ratio < 1 ? "fell" : "rose",
+                       rounded(change.before), with_unit(change.after, change.unit), because);
   return fmt::format("{} {} by {:.0f} %{}.", change.name, ratio < 1 ? "fell" : "rose",
                      100 * std::abs(ratio - 1), because);
 }
@@ -200,9 +216,10 @@ std::string summary_of(const Explanation& e) {
       if (e.effects.empty()) {
         text += " No effect of the catalogue explains it";
       } else {
-        text += fmt::format(" {} closes part of it ({}), but something significant is left that no effect of "
-                            "the catalogue explains",
-                            upper_first(joined(terms_of(e.effects, 3))), closing(e));
+        text += fmt::format(
+            " {} closes part of it ({}), but something significant is left that no effect of "
+            "the catalogue explains",
+            upper_first(joined(terms_of(e.effects, 3))), closing(e));
       }
       if (e.unknown && !e.unknown->depends_on.empty())
         text += "; it depends on " + joined(e.unknown->depends_on);
@@ -221,7 +238,7 @@ std::string summary_of(const Explanation& e) {
       const BaseChange* largest = nullptr;
       double most = 0;
       for (const BaseChange& change : e.base_changes) {
-        const double moved = std::abs(change.after - change.before) / std::abs(change.before);
+        const double moved = moved_by(e, change);
         if (change.sentence.empty() || moved <= most) continue;
         largest = &change;
         most = moved;
@@ -234,9 +251,9 @@ std::string summary_of(const Explanation& e) {
       std::vector<std::string> names = terms_of(e.effects, 3), rivals = terms_of(e.alternatives, 3);
       std::string text = missed(e);
       if (names.empty()) return text + " These data cannot tell what is missing.";
-      text += fmt::format(" {} closes it ({}), but {} cannot be ruled out{}", upper_first(joined(names)),
-                          closing(e), joined(rivals),
-                          e.verdict == Verdict::kFamily ? ", all of one kind" : "");
+      text +=
+          fmt::format(" {} closes it ({}), but {} cannot be ruled out{}", upper_first(joined(names)),
+                      closing(e), joined(rivals), e.verdict == Verdict::kFamily ? ", all of one kind" : "");
       if (!e.alternatives.empty())
         text += fmt::format(": {} fits only {} sigma worse", e.alternatives.front().name,
                             rounded(std::max(0.0, e.alternatives.front().behind_best), 2));
@@ -253,10 +270,11 @@ void describe(const Predictor& predictor, const Library& library, const Found& f
   add_signals(predictor, library, found, e);
   add_waterfall(predictor, library, found, proof, chain, e);
   if (options.traces) {
+    const ModelPoint &before = found.baseline.model, &after = told_model(found, e).model;
     for (const bool heldout : {true, false}) {
-      std::vector<RunTrace> traces =
-          heldout ? proof.traces(found.baseline.model, found.model.model, chain, kTracePoints)
-                  : traces_of(predictor, found.baseline.model, found.model.model, chain, false, kTracePoints);
+      std::vector<RunTrace> traces = heldout
+                                         ? proof.traces(before, after, chain, kTracePoints)
+                                         : traces_of(predictor, before, after, chain, false, kTracePoints);
       for (RunTrace& t : traces) e.traces.push_back(std::move(t));
     }
   }

@@ -14,8 +14,7 @@ namespace {
 /// What the final model leaves over without one of its effects: measured − predicted, weighted; all else as fitted.
 Eigen::VectorXd left_without(const Predictor& predictor, const Found& found, std::size_t effect) {
   ModelPoint model = found.model.model;
-  model.effects.erase(model.effects.begin() +
-                      static_cast<std::ptrdiff_t>(found.model.tolerances + effect));
+  model.effects.erase(model.effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances + effect));
   Eigen::VectorXd predicted = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(model, kAllChains, predicted);
   Eigen::VectorXd left = predictor.measured() - predicted;
@@ -51,8 +50,8 @@ Width loop_width(const Prepared& data, const Weights& weights, const Eigen::Vect
     const PreparedRun& run = data.runs[row.run];
     if (row.chain != chain || run.angle.empty() || run.dry_velocity[row.sample] == 0) continue;
     const double sign = run.dry_velocity[row.sample] > 0 ? 1 : -1;
-    points.emplace_back(by(run, row.sample), -sign * left[static_cast<Eigen::Index>(i)] *
-                                                 weights.sigma[static_cast<int>(chain)]);
+    points.emplace_back(by(run, row.sample),
+                        -sign * left[static_cast<Eigen::Index>(i)] * weights.sigma[static_cast<int>(chain)]);
   }
   Width w;
   if (points.size() < 200) return w;
@@ -78,14 +77,14 @@ void add_widths(const Predictor& predictor, const Found& found, const Eigen::Vec
     if (!std::isfinite(w.low)) return;
     const double change = (w.high - w.low) / std::max(std::abs(w.low), std::abs(w.high));
     c.evidence.push_back(
-        {true, fmt::format("Without it the residual makes a loop over the direction of motion, {} {} wide on "
-                           "either side in the third of the rows with the lowest {}, {} in the third with the "
-                           "highest: {}.",
-                           rounded(w.low * label.scale, 2), label.unit, variable,
-                           rounded(w.high * label.scale, 2),
-                           change > 0.25    ? "it grows"
-                           : change < -0.25 ? "it shrinks"
-                                            : "it stays")});
+        {true,
+         fmt::format("Without it the residual makes a loop over the direction of motion, {} {} wide on "
+                     "either side in the third of the rows with the lowest {}, {} in the third with the "
+                     "highest: {}.",
+                     rounded(w.low * label.scale, 2), label.unit, variable, rounded(w.high * label.scale, 2),
+                     change > 0.25    ? "it grows"
+                     : change < -0.25 ? "it shrinks"
+                                      : "it stays")});
   };
   say(loop_width(data, found.weights, left, chain,
                  [](const PreparedRun& run, std::size_t k) { return std::abs(run.velocity[k]); }),
@@ -123,7 +122,9 @@ Place place_of(const Library& library, const Found& found, const Candidate& c, b
 std::string where_it_fails(const Prepared& data, const Trial& best, const Trial& rival) {
   const Eigen::VectorXd surplus = rival.residual.array().square() - best.residual.array().square();
   const std::vector<Region> found = regions_of(data, chain_of(data, surplus), surplus);
-  return found.empty() ? "" : fmt::format("{:.0f} % of what it misses more sits at {}", 100 * found.front().share, in_words(found.front()));
+  return found.empty() ? ""
+                       : fmt::format("{:.0f} % of what it misses more sits at {}", 100 * found.front().share,
+                                     in_words(found.front()));
 }
 
 double closes(const Found& found, const Step& step, const Trial& trial) {
@@ -148,9 +149,10 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
   const Eigen::VectorXd gain = left.array().square() - found.model.residual.array().square();
   const double sigma = std::sqrt(std::max(0.0, gain.sum()) / std::max(step.screen.noise_unit, 1e-12));
   c.evidence.push_back(
-      {true, fmt::format("Taken out of the final model it is missed by {} sigma; what it adds is {} times the "
-                         "noise floor.",
-                         rounded(sigma, 3), rounded(best.material, 2))});
+      {true,
+       fmt::format("Taken out of the final model it is missed by {} sigma; what it adds is {} times the "
+                   "noise floor.",
+                   rounded(sigma, 3), rounded(best.material, 2))});
   if (!c.parameters.empty() && c.parameters.front().std_error > 0) {
     const Estimated& p = c.parameters.front();
     const double null = h.info().parameters[0].null_value / h.info().parameters[0].si_per_unit;
@@ -171,16 +173,17 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
     const Trial& t = step.trials[i];
     const auto& rival = library.hypotheses[static_cast<std::size_t>(t.hypothesis)].info();
     if (t.in_set) {
-      c.evidence.push_back({false, fmt::format("{} fits only {} sigma worse; {} sigma of data lie between them. "
-                                               "What would tell: {}.",
-                                               rival.term, rounded(std::max(0.0, t.behind.t), 2),
-                                               rounded(t.behind.separation, 2), h.info().told_apart_by)});
+      c.evidence.push_back(
+          {false, fmt::format("{} fits only {} sigma worse; {} sigma of data lie between them. "
+                              "What would tell: {}.",
+                              rival.term, rounded(std::max(0.0, t.behind.t), 2),
+                              rounded(t.behind.separation, 2), h.info().told_apart_by)});
       continue;
     }
     const std::string fails = where_it_fails(data, best, t);
-    c.evidence.push_back({true, fmt::format("It is told from {} ({}) by {} sigma{}.", rival.term,
-                                            h.info().told_apart_by, rounded(t.behind.t, 2),
-                                            fails.empty() ? "" : "; " + fails)});
+    c.evidence.push_back(
+        {true, fmt::format("It is told from {} ({}) by {} sigma{}.", rival.term, h.info().told_apart_by,
+                           rounded(t.behind.t, 2), fails.empty() ? "" : "; " + fails)});
     break;
   }
 }
@@ -201,8 +204,11 @@ void evidence_of_rival(const Predictor& predictor, const Library& library, const
                            rounded(std::max(0.0, place.trial->behind.t), 2), winner.term,
                            rounded(place.trial->behind.separation, 2), own.told_apart_by)});
   } else {
-    c.evidence.push_back({false, fmt::format("It fits {} sigma worse than {}.",
-                                             rounded(place.trial->behind.t, 2), winner.term)});
+    c.evidence.push_back(
+        {false, nests(own.id, winner.id)
+                    ? fmt::format("Its special case, {}, says as much with fewer numbers.", winner.term)
+                    : fmt::format("It fits {} sigma worse than {}.", rounded(place.trial->behind.t, 2),
+                                  winner.term)});
   }
   if (!fails.empty()) c.evidence.push_back({false, fmt::format("Where it falls short: {}.", fails)});
 }

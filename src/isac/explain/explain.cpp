@@ -7,10 +7,14 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/could_hide.hpp"
+#include "isac/explain/describe.hpp"
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/proof.hpp"
+#include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
 #include "isac/explain/unknown.hpp"
+#include "isac/explain/where.hpp"
 
 namespace isac::explain {
 namespace {
@@ -171,8 +175,13 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   // A model that does worse on what it has not seen is not an explanation.
   if (!e.effects.empty() && e.gap.heldout_after > 1.002 * e.gap.heldout_before) e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
-  if (options.next_experiment)
+  if (options.next_experiment && e.verdict != Verdict::kUnknown)
     e.next_experiment = next_experiment(predictor, library, found, {.threads = options.threads});
+  e.where = regions(predictor, library, found);
+  add_raw_effects(predictor, found, proof, options, e);
+  e.could_hide = could_hide(data, library, found, 8);
+  e.not_testable = not_testable(library, found);
+  describe(predictor, library, found, proof, options, e);
   return e;
 }
 

@@ -119,7 +119,7 @@ std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& be
                                           : chain == Chain::kMotion    ? run.slow_torque
                                           : chain == Chain::kPressure1 ? run.smooth_pressure[0]
                                                                        : run.smooth_pressure[1];
-    const std::size_t step = std::max<std::size_t>(1, y0.size() / most_points);
+    const std::size_t step = std::max<std::size_t>(1, (y0.size() + most_points - 1) / most_points);
     for (std::size_t k = 0; k < y0.size(); k += step) {
       if (run.usable[k] == 0) continue;
       t.time.push_back(run.time[k]);
@@ -158,6 +158,13 @@ Sums Proof::residual(const ModelPoint& model, Chain chain) const {
   ModelPoint here = model;
   here.base.resize(predictor_->base().size());
   return raw_residual(*predictor_, here, chain);
+}
+
+std::vector<Series> Proof::series(const ModelPoint& model, Chain chain) const {
+  if (!predictor_) return {};
+  ModelPoint here = model;
+  here.base.resize(predictor_->base().size());
+  return residual_series(*predictor_, here, chain);
 }
 
 std::vector<RunTrace> Proof::traces(const ModelPoint& before, const ModelPoint& after, Chain chain,

@@ -13,6 +13,7 @@
 
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/fit.hpp"
+#include "isac/explain/spectrum.hpp"
 
 namespace isac::explain {
 
@@ -38,6 +39,8 @@ class Proof {
   Proof(const HeldOut& heldout, const Prepared& fitted);
   [[nodiscard]] std::size_t runs() const noexcept { return count_; }
   [[nodiscard]] Sums residual(const ModelPoint& model, Chain chain) const;
+  /// measured − predicted of each run, for what shows at the recording's rate only.
+  [[nodiscard]] std::vector<Series> series(const ModelPoint& model, Chain chain) const;
   [[nodiscard]] std::vector<RunTrace> traces(const ModelPoint& before, const ModelPoint& after, Chain chain,
                                              std::size_t most_points) const;
 

@@ -1,5 +1,6 @@
 #include "isac/explain/uncertainty.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "isac/estimate/block_covariance.hpp"
@@ -80,7 +81,8 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
     const auto at = static_cast<std::size_t>(j);
     const Coordinate& c = used[static_cast<std::size_t>(columns[at])];
     if (c.tolerance) continue;
-    const double error = std::sqrt(v.covariance(j, j)) * c.scale / norm[at], degrees = v.degrees_of_freedom[j];
+    const double error = std::sqrt(v.covariance(j, j)) * c.scale / norm[at],
+                 degrees = v.degrees_of_freedom[j];
     if (c.base >= 0) {
       const auto b = static_cast<std::size_t>(c.base);
       give_interval(out.base[b], error / predictor.base()[b].si_per_unit, degrees);

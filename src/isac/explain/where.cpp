@@ -121,7 +121,8 @@ double quiet_level(const Prepared& data, const Eigen::VectorXd& residual,
                    const std::vector<std::size_t>& rows) {
   std::vector<double> sum(data.blocks, 0.0), count(data.blocks, 0.0), level;
   for (const std::size_t i : rows) {
-    sum[data.rows[i].block] += residual[static_cast<Eigen::Index>(i)] * residual[static_cast<Eigen::Index>(i)];
+    sum[data.rows[i].block] +=
+        residual[static_cast<Eigen::Index>(i)] * residual[static_cast<Eigen::Index>(i)];
     ++count[data.rows[i].block];
   }
   for (std::size_t b = 0; b < sum.size(); ++b)
@@ -144,7 +145,9 @@ const char* subsystem_of(Chain chain) noexcept {
 
 std::string in_words(const Region& region) {
   if (region.variable == "direction")
-    return region.low > 0 ? "moving up" : (region.high < 0 ? "moving down" : "standing still");
+    return region.low < region.high ? "while moving"
+           : region.low > 0         ? "moving up"
+                                    : (region.high < 0 ? "moving down" : "standing still");
   const std::string name = region.variable == "delta_pressure"  ? "pressure difference"
                            : region.variable == "mean_pressure" ? "mean pressure"
                                                                 : region.variable;
@@ -160,7 +163,7 @@ std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::V
         direction ? std::vector<double>{-1.5, -0.5, 0.5, 1.5} : borders_of(v.value);
     if (borders.size() < 3) continue;
     std::vector<double> bin_weight(borders.size() - 1, 0.0), bin_rows(borders.size() - 1, 0.0);
-    double all_weight = 0, all_rows = 0;
+    double all_weight = 0, all_rows = 0, known_weight = 0, known_rows = 0;
     for (std::size_t n = 0; n < rows.size(); ++n) {
       const double w = weight[static_cast<Eigen::Index>(rows[n])];
       all_weight += w;
@@ -170,19 +173,29 @@ std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::V
       const auto bin = static_cast<std::size_t>(above - borders.begin() - 1);
       bin_weight[bin] += w;
       ++bin_rows[bin];
+      known_weight += w;
+      ++known_rows;
     }
     if (!(all_weight > 0)) return {};
-    if (direction) {  // up and down together are moving, which the speed says
-      for (std::size_t b = 0; b < 3; ++b) {
-        const double share = std::clamp(bin_weight[b] / all_weight, 0.0, 1.0);
-        const double says = information(share, bin_rows[b] / all_rows);
-        const double at = static_cast<double>(b) - 1;
-        if (says >= kWorthSaying)
-          found.emplace_back(says, Region{"", "", v.name, at, at, v.unit, share});
-      }
+    if (known_weight <= 0) continue;
+    const double known = std::min(1.0, known_weight / all_weight);
+    if (direction) {
+      const auto one = [&](double low, double high, double w, double r) {
+        const double share = std::clamp(w / all_weight, 0.0, 1.0);
+        const double says = information(share, r / all_rows);
+        if (says >= kWorthSaying) found.emplace_back(says, Region{"", "", v.name, low, high, v.unit, share});
+      };
+      one(-1, 1, bin_weight[0] + bin_weight[2], bin_rows[0] + bin_rows[2]);
+      for (std::size_t b = 0; b < 3; ++b)
+        one(static_cast<double>(b) - 1, static_cast<double>(b) - 1, bin_weight[b], bin_rows[b]);
       continue;
     }
-    const Best best = best_range(borders, bin_weight, bin_rows, all_weight, all_rows);
+    // Among the rows that have the variable: that a row has it at all is no region.
+    Best best = best_range(borders, bin_weight, bin_rows, known_weight, known_rows);
+    best.says *= known;
+    best.share *= known;
+    const double range = borders.back() - borders.front();
+    if (std::abs(best.low) < 1e-6 * range) best.low = 0;
     if (best.says >= kWorthSaying)
       found.emplace_back(best.says, Region{"", "", v.name, best.low, best.high, v.unit, best.share});
   }

@@ -5,7 +5,7 @@
 ///
 /// r_after is the final model's residual where effects were added; otherwise the noise of the quietest quarter of the blocks
 /// takes its place. For each variable the range of bins is chosen that says most, Σ share·ln(share/share of the rows): a range
-/// that holds half of the disagreement in half of the rows says nothing. Standing still is a direction of its own, and what
+/// that holds half of the disagreement in half of the rows says nothing. Standing still (0) is a direction beside up (1) and down (-1), -1 to 1 is moving, and what
 /// follows a reversal is measured by the travel since it, so that moving and holding are told apart.
 /// Units: as Region. Threads: pure. Errors: none.
 /// Source: docs/derivations/explain.md.

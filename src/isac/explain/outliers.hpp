@@ -1,0 +1,33 @@
+/// @file
+/// Single samples that stand out of what a model leaves over: spikes of a reading.
+///
+///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other
+///   limit = max(q98 + b ln(0.02 N/α), 8 s, 3 quanta),  b = max((q98 − q90)/ln 5, q98/ln 50)
+///
+/// q are quantiles of |d|: tails are continued as an exponential, so that noise with tails as thin as Laplace's passes the limit
+/// anywhere in N samples with probability α at most; normal noise never comes near it. s is the standard deviation of white
+/// noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
+/// Units: the signal's. Threads: pure. Errors: none.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "isac/explain/spectrum.hpp"
+
+namespace isac::explain {
+
+struct Outliers {
+  std::size_t count = 0, samples = 0;
+  double height = 0;  ///< median |d| of the outliers
+  double limit = 0;   ///< beyond which a sample is one
+  double rms = 0;     ///< √(Σ d²/N) over the outliers: what they add to the residual
+};
+
+/// Outliers of all series together; `quantum` is the smallest change of the reading (0: none).
+[[nodiscard]] Outliers find_outliers(std::span<const Series> runs, double quantum = 0);
+/// Those beyond a limit that is known already.
+[[nodiscard]] Outliers count_outliers(std::span<const Series> runs, double limit);
+
+}  // namespace isac::explain

@@ -1,0 +1,225 @@
+#include "isac/explain/raw_effects.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/labels.hpp"
+#include "isac/explain/outliers.hpp"
+#include "isac/explain/spectrum.hpp"
+#include "isac/models/effects.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kMainsLow = 45, kMainsHigh = 65;  // Hz, as the catalogue has it
+constexpr std::size_t kFewestSpikes = 5;
+
+/// Mean square that something takes out of a residual; negative where it adds.
+using Taken = std::function<double(const std::vector<Series>&)>;
+
+struct RawEffect {
+  Candidate candidate;
+  Chain chain = Chain::kTorque;
+  double rms = 0, p_value = 1;
+  double frequency = kNotKnown;  ///< Hz
+  Taken taken;
+};
+
+Candidate candidate_of(const char* id) {
+  const auto& info = models::effect_catalogue()[static_cast<unsigned>(models::find_effect(id))];
+  Candidate c;
+  c.id = c.form = id;
+  c.name = info.term;
+  c.subsystem = subsystem_name(info.where);
+  c.equation = info.equation;
+  c.confidence = 0.97;
+  for (int p = 0; p < info.parameter_count; ++p) {
+    Estimated e;
+    e.name = info.parameters[p].name;
+    e.unit = info.parameters[p].unit;
+    c.parameters.push_back(std::move(e));
+  }
+  return c;
+}
+
+void set(Estimated& e, double value, double error) {
+  e.value = value;
+  if (!std::isfinite(error)) return;
+  e.std_error = error;
+  e.ci_low = value - 1.96 * error;
+  e.ci_high = value + 1.96 * error;
+}
+
+/// What a line of known frequency and amplitude takes out of runs; the phase as the head of this file says.
+double taken_by_line(const SpectralLine& line, const std::vector<Series>& runs) {
+  double squares = 0, count = 0;
+  for (const Series& run : runs) {
+    double sine = line.sine, cosine = line.cosine;
+    if (!line.repeats) {
+      const Phase phase = phase_in(run, line.frequency);
+      sine = line.amplitude * phase.sine;
+      cosine = line.amplitude * phase.cosine;
+    }
+    const double turn = 2 * kPi * line.frequency;
+    for (std::size_t k = 0; k < run.value.size(); ++k) {
+      const double y = run.value[k];
+      if (!std::isfinite(y)) continue;
+      const double at = turn * (run.start + static_cast<double>(k) * run.interval);
+      const double left = y - sine * std::sin(at) - cosine * std::cos(at);
+      squares += y * y - left * left;
+      count += 1;
+    }
+  }
+  return count > 0 ? squares / count : 0.0;
+}
+
+double taken_by_limit(double limit, const std::vector<Series>& runs) {
+  const Outliers o = count_outliers(runs, limit);
+  return o.rms * o.rms;
+}
+
+double quantum_of(const Prepared& data) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const PreparedRun& run : data.runs)
+    for (std::size_t k = 1; k < run.torque.size(); ++k) {
+      const double change = std::abs(run.torque[k] - run.torque[k - 1]);
+      if (change > 1e-9 * std::abs(run.torque[k]) && change > 0) least = std::min(least, change);
+    }
+  return std::isfinite(least) ? least : 0.0;
+}
+
+RawEffect hum_or_disturbance(const Predictor& predictor, const SpectralLine& line, Chain chain) {
+  const RigFacts& rig = predictor.data().rig;
+  const bool forces = predictor.data().baseline.terms.empty() && std::isfinite(rig.wheel_radius);
+  const bool mains =
+      forces && chain == Chain::kTorque && line.frequency >= kMainsLow && line.frequency <= kMainsHigh;
+  RawEffect effect;
+  effect.candidate = candidate_of(mains ? "mains_hum" : "periodic_disturbance");
+  effect.chain = chain;
+  effect.rms = line.rms;
+  effect.p_value = line.p_value;
+  effect.frequency = line.frequency;
+  const double scale = mains ? 1 / rig.wheel_radius : 1.0;
+  auto& p = effect.candidate.parameters;
+  // Where the phase does not repeat there is no s and c; s then holds the amplitude.
+  set(p[0], scale * (line.repeats ? line.sine : line.amplitude), scale * line.amplitude_error);
+  set(p[1], scale * (line.repeats ? line.cosine : 0.0),
+      line.repeats ? scale * line.amplitude_error : kNotKnown);
+  set(p[2], line.frequency, kNotKnown);
+  effect.candidate.evidence.push_back(
+      {true, fmt::format(
+                 "One line at {} Hz, {} {} in amplitude, stands out in {} runs (p {} over all frequencies); "
+                 "it holds {:.0f} % of the residual's power there.",
+                 rounded(line.frequency, 4), rounded(scale * line.amplitude), p[0].unit, line.runs,
+                 line.p_value < 0.001 ? "< 0.001" : "= " + rounded(line.p_value, 2), 100 * line.share)});
+  effect.candidate.evidence.push_back(
+      {true, line.repeats
+                 ? "Its phase is that of the run's clock; neither command nor motion has a line there."
+                 : "Its phase differs from run to run: it is not locked to the command."});
+  effect.taken = [line](const std::vector<Series>& runs) { return taken_by_line(line, runs); };
+  return effect;
+}
+
+std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
+                            const ExplainOptions& options) {
+  std::vector<RawEffect> all;
+  const Prepared& data = predictor.data();
+  const std::vector<Series> torque = residual_series(predictor, model, Chain::kTorque);
+  for (const SpectralLine& line : spectral_lines(torque, options.significance))
+    all.push_back(hum_or_disturbance(predictor, line, Chain::kTorque));
+  if (data.has(Chain::kMotion) && all.empty())
+    for (SpectralLine line : spectral_lines(predictor, model, Chain::kMotion, options.significance)) {
+      const double turn = 2 * kPi * line.frequency * data.smoothing.motion;
+      if (turn < 1.5) all.push_back(hum_or_disturbance(predictor, line, Chain::kMotion));
+    }
+  const Outliers spikes = find_outliers(torque, quantum_of(data));
+  if (data.baseline.terms.empty() && std::isfinite(data.rig.wheel_radius) && spikes.count >= kFewestSpikes) {
+    RawEffect effect;
+    effect.candidate = candidate_of("spikes");
+    effect.rms = spikes.rms;
+    effect.p_value = 0.001;
+    const double count = static_cast<double>(spikes.count), n = static_cast<double>(spikes.samples);
+    // Either of two sensors may jump.
+    set(effect.candidate.parameters[0], 0.5 * count / n, 0.5 * std::sqrt(count) / n);
+    set(effect.candidate.parameters[1], spikes.height / data.rig.wheel_radius, kNotKnown);
+    effect.candidate.evidence.push_back(
+        {true,
+         fmt::format("{} single samples of {} stand {} N m or more beside both neighbours, {} N m in the "
+                     "middle; noise with the residual's own tails would leave none.",
+                     spikes.count, spikes.samples, rounded(spikes.limit), rounded(spikes.height))});
+    const double limit = spikes.limit;
+    effect.taken = [limit](const std::vector<Series>& runs) { return taken_by_limit(limit, runs); };
+    all.push_back(std::move(effect));
+  }
+  return all;
+}
+
+double less(double rms, double mean_square) {
+  return std::isfinite(rms) ? std::sqrt(std::max(0.0, rms * rms - mean_square)) : rms;
+}
+
+}  // namespace
+
+void add_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof,
+                     const ExplainOptions& options, Explanation& e) {
+  if (e.verdict == Verdict::kUnknown) return;
+  const ModelPoint& model = e.effects.empty() ? found.baseline.model : found.model.model;
+  std::vector<RawEffect> effects = look(predictor, model, options);
+  std::stable_sort(effects.begin(), effects.end(),
+                   [](const RawEffect& a, const RawEffect& b) { return a.rms > b.rms; });
+  for (RawEffect& effect : effects) {
+    const std::string id = effect.candidate.id;
+    const auto is = [&](const Candidate& c) { return c.id == id; };
+    if (std::any_of(e.effects.begin(), e.effects.end(), is) ||
+        std::find(options.excluded.begin(), options.excluded.end(), id) != options.excluded.end())
+      continue;
+    const double floor = found.floors.white[static_cast<int>(effect.chain)];
+    if (!(effect.rms >= options.material * floor)) continue;
+    const double fitted = effect.taken(residual_series(predictor, model, effect.chain));
+    const double held = proof.runs() > 0 ? effect.taken(proof.series(model, effect.chain)) : fitted;
+    if (fitted <= 0 || held <= 0) {
+      e.trials.push_back({id, "significant on the fitted runs, but does not shrink the gap on the others"});
+      continue;
+    }
+    const Label label = label_of(predictor.data(), effect.chain);
+    if (e.effects.empty() && e.gap.signal != label.signal) {
+      e.gap = {};
+      e.gap.signal = label.signal;
+      e.gap.unit = label.unit;
+      e.gap.noise_floor = floor;
+      e.gap.before = e.gap.after = raw_residual(predictor, model, effect.chain).rms();
+      const Sums sums = proof.residual(model, effect.chain);
+      e.gap.heldout_before = e.gap.heldout_after = sums.rms();
+      e.gap.heldout_zero_model = sums.signal_rms();
+    }
+    if (e.gap.signal == label.signal) {
+      e.gap.after = less(e.gap.after, fitted);
+      e.gap.heldout_after = less(e.gap.heldout_after, held);
+      const double open = e.gap.heldout_before * e.gap.heldout_before - floor * floor;
+      if (open > 0)
+        e.gap.share_closed = 1 - (e.gap.heldout_after * e.gap.heldout_after - floor * floor) / open;
+      e.waterfall.push_back({effect.candidate.name, e.gap.after, e.gap.heldout_after});
+    }
+    effect.candidate.evidence.push_back(
+        {true, fmt::format("It takes {} {} rms out of the {} on runs that were never fitted.",
+                           rounded(std::sqrt(held)), label.unit, label.signal)});
+    const double all = e.gap.before * e.gap.before - e.gap.after * e.gap.after;
+    if (e.gap.signal == label.signal && all > 0) effect.candidate.closes = std::clamp(fitted / all, 0.0, 1.0);
+    if (std::isfinite(effect.frequency))
+      e.where.push_back({effect.candidate.subsystem, label.signal, "frequency", effect.frequency,
+                         effect.frequency, "Hz", effect.candidate.closes});
+    e.trials.push_back({id, fmt::format("found at the recording's rate: {} times the noise floor",
+                                        rounded(effect.rms / floor, 2))});
+    e.effects.push_back(std::move(effect.candidate));
+    e.p_value = std::min(e.p_value, effect.p_value);
+    e.detected = true;
+    if (e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial) e.verdict = Verdict::kNamed;
+  }
+}
+
+}  // namespace isac::explain
