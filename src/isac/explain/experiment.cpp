@@ -90,8 +90,15 @@ Eigen::MatrixXd gram_over(const Predictor& predictor, const Fit& stem, const Wei
   Eigen::MatrixXd columns(rows, base.cols() + static_cast<Eigen::Index>(slopes.size() + responses.size()));
   columns.leftCols(base.cols()) = base;
   Eigen::Index at = base.cols();
-  for (const auto& v : slopes) columns.col(at++) = v;
-  for (const auto& v : responses) columns.col(at++) = v;
+  for (const auto* group : {&slopes, &responses})
+    for (const auto& v : *group) {
+      // A number that the equation does not bear at its bound says nothing.
+      if (v.allFinite()) {
+        columns.col(at++) = v;
+      } else {
+        columns.col(at++).setZero();
+      }
+    }
   std::vector<Eigen::Index> resting;
   for (std::size_t j = 0; j < used.size(); ++j)
     if (used[j].rest >= 0) resting.push_back(static_cast<Eigen::Index>(j));
@@ -172,7 +179,7 @@ bool Designer::suppose_typical() {
   return changed;
 }
 
-std::optional<Designer::Gram> Designer::gram_of(const PlannedRun& run) const {
+std::optional<Designer::Information> Designer::information(const PlannedRun& run) const {
   ModelPoint truth = tie_.stem.model;
   truth.effects.push_back(tie_.models.front());
   const std::optional<Prepared> data = would_record(*tie_.predictor, truth, range_, run);
@@ -181,12 +188,12 @@ std::optional<Designer::Gram> Designer::gram_of(const PlannedRun& run) const {
   Fit stem = tie_.stem;
   stem.model.rest.assign(1, 0.0);
   std::vector<Coordinate> used;
-  Gram gram = gram_over(predictor, stem, tie_.weights, tie_.models, tie_.noise_unit, used);
+  Information gram = gram_over(predictor, stem, tie_.weights, tie_.models, tie_.noise_unit, used);
   if (gram.cols() != recorded_.cols() || !gram.allFinite()) return std::nullopt;
   return gram;
 }
 
-double Designer::one_way(const Gram& gram, std::size_t truth, std::size_t refitted) const {
+double Designer::one_way(const Information& gram, std::size_t truth, std::size_t refitted) const {
   const Eigen::Index base = begin_.front(), x = begin_.back();
   std::vector<Eigen::Index> free;
   for (Eigen::Index i = 0; i < base; ++i) free.push_back(i);
@@ -208,38 +215,24 @@ double Designer::one_way(const Gram& gram, std::size_t truth, std::size_t refitt
   return std::sqrt(std::max(0.0, left) / tie_.noise_unit);
 }
 
-double Designer::separation(const Gram& gram, std::size_t a, std::size_t b) const {
+double Designer::separation(const Information& gram, std::size_t a, std::size_t b) const {
   const std::string name_a = tie_.models[a].hypothesis->id(), name_b = tie_.models[b].hypothesis->id();
   if (nests(name_a, name_b)) return one_way(gram, a, b);
   if (nests(name_b, name_a)) return one_way(gram, b, a);
   return std::min(one_way(gram, a, b), one_way(gram, b, a));
 }
 
-double Designer::smallest(const Gram& gram, const std::vector<std::size_t>& rivals) const {
+double Designer::smallest(const Information& gram, const std::vector<std::size_t>& rivals) const {
   double least = std::numeric_limits<double>::infinity();
   for (const std::size_t r : rivals) least = std::min(least, separation(gram, 0, r));
   return least;
 }
 
-double Designer::now(std::size_t a, std::size_t b) const {
-  return separation(recorded_, a, b);
-}
-
-double Designer::expected(std::size_t a, std::size_t b, const std::vector<PlannedRun>& runs) const {
-  Gram sum = recorded_;
-  for (const PlannedRun& run : runs) {
-    const std::optional<Gram> gram = gram_of(run);
-    if (!gram) return kNotKnown;
-    sum += *gram;
-  }
-  return separation(sum, a, b);
-}
-
-std::vector<std::optional<Designer::Gram>> Designer::all_grams() const {
-  std::vector<std::optional<Gram>> grams(candidates_.size());
+std::vector<std::optional<Designer::Information>> Designer::all_candidates() const {
+  std::vector<std::optional<Information>> grams(candidates_.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t i = next++; i < grams.size(); i = next++) grams[i] = gram_of(candidates_[i]);
+    for (std::size_t i = next++; i < grams.size(); i = next++) grams[i] = information(candidates_[i]);
   };
   std::vector<std::thread> pool;
   for (int t = 1; t < options_.threads; ++t) pool.emplace_back(work);
@@ -291,7 +284,7 @@ std::vector<PlannedRun> neighbours(const PlannedRun& run, double step) {
 
 }  // namespace
 
-Designer::Choice Designer::improve(Choice choice, const Gram& before,
+Designer::Choice Designer::improve(Choice choice, const Information& before,
                                    const std::vector<std::size_t>& rivals) const {
   const double already = smallest(before, rivals);
   for (const double step : {0.3, 0.12}) {
@@ -302,7 +295,7 @@ Designer::Choice Designer::improve(Choice choice, const Gram& before,
       Choice best = choice;
       for (const PlannedRun& run : near) {
         if (least_seconds(run) > options_.longest) continue;
-        const std::optional<Gram> gram = gram_of(run);
+        const std::optional<Information> gram = information(run);
         if (!gram) continue;
         const double score = score_of(already, smallest(before + *gram, rivals), options_.wanted, run);
         if (score <= best.score + 1e-9) continue;
@@ -315,7 +308,7 @@ Designer::Choice Designer::improve(Choice choice, const Gram& before,
   return choice;
 }
 
-Designer::Choice Designer::lengthen(Choice choice, const Gram& before,
+Designer::Choice Designer::lengthen(Choice choice, const Information& before,
                                     const std::vector<std::size_t>& rivals) const {
   const double already = smallest(before, rivals);
   double seconds =
@@ -324,7 +317,7 @@ Designer::Choice Designer::lengthen(Choice choice, const Gram& before,
     PlannedRun run = choice.run;
     run.seconds = std::min(options_.longest, std::max(least_seconds(run), seconds));
     run = tidy(run);
-    const std::optional<Gram> gram = gram_of(run);
+    const std::optional<Information> gram = information(run);
     if (!gram) return choice;
     const bool reached = smallest(before + *gram, rivals) >= options_.wanted;
     choice = {run, *gram, choice.score};
@@ -336,12 +329,12 @@ Designer::Choice Designer::lengthen(Choice choice, const Gram& before,
 NextExperiment Designer::design() const {
   const auto id = [&](std::size_t i) { return tie_.models[i].hypothesis->id(); };
   const auto term = [&](std::size_t i) { return std::string(tie_.models[i].hypothesis->info().term); };
-  const std::vector<std::optional<Gram>> grams = all_grams();
+  const std::vector<std::optional<Information>> grams = all_candidates();
   // Two of the longest runs of the best kind: who cannot be told apart even so needs another rig, not another run.
   std::vector<std::size_t> rivals, twins;
   std::vector<double> reach(tie_.models.size(), 0.0);
   for (std::size_t r = 1; r < tie_.models.size(); ++r) {
-    const double already = now(0, r);
+    const double already = separation(recorded_, 0, r);
     for (std::size_t i = 0; i < grams.size(); ++i) {
       if (!grams[i]) continue;
       const double after = separation(recorded_ + *grams[i], 0, r);
@@ -356,14 +349,14 @@ NextExperiment Designer::design() const {
   const auto give_up = [&](std::size_t rival) {
     next.runs.clear();
     next.separates_b = id(rival);
-    next.separation_now = now(0, rival);
+    next.separation_now = separation(recorded_, 0, rival);
     next.separation_expected = reach[rival];
     next.sentence = words_for_hardware(id(0), id(rival), term(0), term(rival), reach[rival]);
     return next;
   };
   if (rivals.empty()) return give_up(twins.front());
 
-  Gram sum = recorded_;
+  Information sum = recorded_;
   for (int count = 0; count < 2; ++count) {
     const double already = smallest(sum, rivals);
     Choice best;
@@ -383,7 +376,7 @@ NextExperiment Designer::design() const {
   for (const std::size_t r : rivals)
     if (separation(sum, 0, r) < separation(sum, 0, hardest)) hardest = r;
   next.separates_b = id(hardest);
-  next.separation_now = now(0, hardest);
+  next.separation_now = separation(recorded_, 0, hardest);
   next.separation_expected = separation(sum, 0, hardest);
   if (next.separation_expected < options_.least) return give_up(hardest);
   next.sentence =

@@ -30,7 +30,7 @@
 namespace isac::explain {
 
 struct ExperimentOptions {
-  series::ExcitationOptions limits;  ///< initial_pressure is the rig's
+  series::ExcitationOptions limits = {};  ///< initial_pressure is the rig's
   int threads = 2;
   double wanted =
       7;  ///< sigma that a plan is given time for: a rival 7 sigma away is ruled out 19 times in 20
@@ -52,30 +52,31 @@ class Designer {
  public:
   Designer(Tie tie, const ExperimentOptions& options);
 
-  /// Sigma between two of the models in what is recorded, and with runs added; NaN if a run is not possible.
-  [[nodiscard]] double now(std::size_t a, std::size_t b) const;
-  [[nodiscard]] double expected(std::size_t a, std::size_t b, const std::vector<PlannedRun>& runs) const;
+  /// (S, x)ᵀ(S, x) over the rows of a run, which must be added to those of others; empty if the run is not possible.
+  using Information = Eigen::MatrixXd;
+  [[nodiscard]] std::optional<Information> information(const PlannedRun& run) const;
+  [[nodiscard]] const Information& recorded() const noexcept { return recorded_; }
+  /// Sigma between two of the models.
+  [[nodiscard]] double separation(const Information& sum, std::size_t a, std::size_t b) const;
+
   [[nodiscard]] const std::vector<PlannedRun>& candidates() const noexcept { return candidates_; }
   /// What to do next.
   [[nodiscard]] NextExperiment design() const;
 
  private:
-  using Gram = Eigen::MatrixXd;
   struct Choice {
     PlannedRun run;
-    Gram gram;
+    Information gram;
     double score = 0;
   };
   void look_back();
   bool suppose_typical();
-  [[nodiscard]] std::optional<Gram> gram_of(const PlannedRun& run) const;
-  [[nodiscard]] double separation(const Gram& gram, std::size_t a, std::size_t b) const;
-  [[nodiscard]] double one_way(const Gram& gram, std::size_t truth, std::size_t refitted) const;
-  [[nodiscard]] double smallest(const Gram& gram, const std::vector<std::size_t>& rivals) const;
-  [[nodiscard]] std::vector<std::optional<Gram>> all_grams() const;
-  [[nodiscard]] Choice improve(Choice choice, const Gram& before,
+  [[nodiscard]] double one_way(const Information& sum, std::size_t truth, std::size_t refitted) const;
+  [[nodiscard]] double smallest(const Information& sum, const std::vector<std::size_t>& rivals) const;
+  [[nodiscard]] std::vector<std::optional<Information>> all_candidates() const;
+  [[nodiscard]] Choice improve(Choice choice, const Information& before,
                                const std::vector<std::size_t>& rivals) const;
-  [[nodiscard]] Choice lengthen(Choice choice, const Gram& before,
+  [[nodiscard]] Choice lengthen(Choice choice, const Information& before,
                                 const std::vector<std::size_t>& rivals) const;
 
   Tie tie_;
@@ -84,7 +85,7 @@ class Designer {
   std::vector<PlannedRun> candidates_;
   std::vector<Eigen::Index> begin_;  ///< of each model's columns, then of the responses
   Eigen::VectorXd prior_;            ///< diagonal, of the parameters' columns
-  Gram recorded_;
+  Information recorded_;
 };
 
 /// What the search left tied, if anything.
