@@ -33,7 +33,7 @@ Chain chain_of(const Prepared& data, const Eigen::VectorXd& weight) {
 }
 
 std::string share_in_words(const Region& r) {
-  return fmt::format("{:.0f} % of it sits at {}", 100 * r.share, in_words(r));
+  return fmt::format("{:.0f} % of it sits {}", 100 * r.share, in_words(r));
 }
 
 /// Half the width of the loop that a residual makes over the direction of motion, below and above the middle of `by`.
@@ -123,7 +123,7 @@ std::string where_it_fails(const Prepared& data, const Trial& best, const Trial&
   const Eigen::VectorXd surplus = rival.residual.array().square() - best.residual.array().square();
   const std::vector<Region> found = regions_of(data, chain_of(data, surplus), surplus);
   return found.empty() ? ""
-                       : fmt::format("{:.0f} % of what it misses more sits at {}", 100 * found.front().share,
+                       : fmt::format("{:.0f} % of what it misses more sits {}", 100 * found.front().share,
                                      in_words(found.front()));
 }
 
@@ -178,6 +178,13 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
                               "What would tell: {}.",
                               rival.term, rounded(std::max(0.0, t.behind.t), 2),
                               rounded(t.behind.separation, 2), h.info().told_apart_by)});
+      continue;
+    }
+    if (nests(rival.id, h.info().id)) {
+      c.evidence.push_back(
+          {true, fmt::format("Its general case, {}, fits no better than further numbers make it: the simpler "
+                             "one stands.",
+                             rival.term)});
       continue;
     }
     const std::string fails = where_it_fails(data, best, t);

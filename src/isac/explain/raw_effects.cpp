@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kMainsLow = 45, kMainsHigh = 65;  // Hz, as the catalogue has it
 constexpr std::size_t kFewestSpikes = 5;
+constexpr double kLooks = 3;  // lines of torque, of motion, and spikes share the significance
 
 /// Mean square that something takes out of a residual; negative where it adds.
 using Taken = std::function<double(const std::vector<Series>&)>;
@@ -130,10 +131,11 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
   std::vector<RawEffect> all;
   const Prepared& data = predictor.data();
   const std::vector<Series> torque = residual_series(predictor, model, Chain::kTorque);
-  for (const SpectralLine& line : spectral_lines(torque, options.significance))
+  for (const SpectralLine& line : spectral_lines(torque, options.significance / kLooks))
     all.push_back(hum_or_disturbance(predictor, line, Chain::kTorque));
   if (data.has(Chain::kMotion) && all.empty())
-    for (SpectralLine line : spectral_lines(predictor, model, Chain::kMotion, options.significance)) {
+    for (SpectralLine line :
+         spectral_lines(predictor, model, Chain::kMotion, options.significance / kLooks)) {
       const double turn = 2 * kPi * line.frequency * data.smoothing.motion;
       if (turn < 1.5) all.push_back(hum_or_disturbance(predictor, line, Chain::kMotion));
     }

@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kBins = 6;
 constexpr double kWorthSaying = 0.08;       // nats: below it the region is where the rows are
+constexpr double kTimeCounts = 0.5;         // of what a signal says
 constexpr double kSignificantChain = 0.15;  // of all that is explainable
 constexpr std::size_t kMostRegions = 4;
 
@@ -151,7 +152,7 @@ std::string in_words(const Region& region) {
   const std::string name = region.variable == "delta_pressure"  ? "pressure difference"
                            : region.variable == "mean_pressure" ? "mean pressure"
                                                                 : region.variable;
-  return fmt::format("{} from {} to {} {}", name, rounded(region.low), rounded(region.high), region.unit);
+  return fmt::format("at {} from {} to {} {}", name, rounded(region.low), rounded(region.high), region.unit);
 }
 
 std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::VectorXd& weight) {
@@ -192,7 +193,8 @@ std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::V
     }
     // Among the rows that have the variable: that a row has it at all is no region.
     Best best = best_range(borders, bin_weight, bin_rows, known_weight, known_rows);
-    best.says *= known;
+    // Time is named where nothing else says as much: which run came first is a choice of whoever recorded.
+    best.says *= known * (std::string(v.unit) == "s" ? kTimeCounts : 1.0);
     best.share *= known;
     const double range = borders.back() - borders.front();
     if (std::abs(best.low) < 1e-6 * range) best.low = 0;

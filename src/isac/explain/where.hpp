@@ -30,7 +30,7 @@ namespace isac::explain {
 
 /// "muscle" of torque, "pcu" of the pressures, "joint" of motion.
 [[nodiscard]] const char* subsystem_of(Chain chain) noexcept;
-/// "angle from 0.31 to 0.92 rad"; "standing still".
+/// "at angle from 0.31 to 0.92 rad"; "standing still".
 [[nodiscard]] std::string in_words(const Region& region);
 
 }  // namespace isac::explain

@@ -1,0 +1,69 @@
+#include "isac/explain/outliers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace isac::explain {
+namespace {
+
+Series series_of(std::vector<double> value) {
+  Series s;
+  s.interval = 0.002;
+  s.value = std::move(value);
+  return s;
+}
+
+TEST(Outliers, raises_no_false_alarm_in_white_coloured_heavy_or_quantised_noise) {
+  std::normal_distribution<double> gauss;
+  std::exponential_distribution<double> decay;
+  for (int kind = 0; kind < 4; ++kind) {
+    std::mt19937 random(21);
+    int alarms = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      std::vector<double> x;
+      double slow = 0;
+      for (int k = 0; k < 4000; ++k) {
+        slow = 0.98 * slow + 0.2 * gauss(random);
+        const double v = gauss(random), laplace = (v > 0 ? 1 : -1) * decay(random);
+        x.push_back(kind == 0   ? v
+                    : kind == 1 ? slow + 0.2 * v
+                    : kind == 2 ? laplace
+                                : std::round(0.25 * v + 0.2 * slow));  // mostly rests, a last bit flickers
+      }
+      const std::vector<Series> runs = {series_of(std::move(x))};
+      alarms += find_outliers(runs, kind == 3 ? 1.0 : 0.0).count > 0 ? 1 : 0;
+    }
+    EXPECT_LE(alarms, 3) << kind;  // 1 % of 300; 0.1 % is what the limit is made for
+  }
+}
+
+TEST(Outliers, counts_spikes_and_measures_their_height) {
+  std::mt19937 random(22);
+  std::normal_distribution<double> gauss;
+  std::vector<double> x;
+  for (int k = 0; k < 20000; ++k) x.push_back(gauss(random));
+  for (int k = 0; k < 40; ++k) x[static_cast<std::size_t>(250 + 480 * k)] += k % 2 == 0 ? 30.0 : -30.0;
+  const std::vector<Series> runs = {series_of(x)};
+  const Outliers o = find_outliers(runs);
+  EXPECT_EQ(o.count, 40U);
+  EXPECT_EQ(o.samples, 19998U);
+  EXPECT_NEAR(o.height, 30,
+              0.8);  // median of 40 heights of standard deviation 1.22: four errors of 0.24, less a bit
+  EXPECT_NEAR(o.rms, 30 * std::sqrt(40.0 / 19998), 0.05);
+  EXPECT_EQ(count_outliers(runs, o.limit).count, 40U);
+}
+
+TEST(Outliers, does_not_take_a_step_or_a_gap_for_a_spike) {
+  std::mt19937 random(23);
+  std::normal_distribution<double> gauss;
+  std::vector<double> x;
+  for (int k = 0; k < 10000; ++k) x.push_back(gauss(random) + ((k / 500) % 2 == 0 ? 0.0 : 50.0));
+  for (int k = 3000; k < 3100; ++k) x[static_cast<std::size_t>(k)] = std::nan("");
+  const std::vector<Series> runs = {series_of(std::move(x))};
+  EXPECT_EQ(find_outliers(runs).count, 0U);
+}
+
+}  // namespace
+}  // namespace isac::explain
