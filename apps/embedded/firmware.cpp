@@ -6,6 +6,7 @@
 #include <span>
 
 #include "arm_loop.hpp"
+#include "isac/models/parameter_table.hpp"
 #include "semihosting.hpp"
 #include "simulated_arm.hpp"
 
@@ -78,13 +79,14 @@ Story story;
 }
 
 [[gnu::noinline]] std::uint32_t start(RunRecord& run) noexcept {
-  // The table says itself how long it is; a length that cannot be is cut to the room and refused by the loader.
+  // The table says itself how long it is; where that cannot be, the loader sees all there is and says why not.
   const std::uint32_t room = reinterpret_cast<std::uintptr_t>(isac_table_room);
   std::uint32_t length = 0;
   for (unsigned i = 0; i < 4; ++i)
     length |= std::to_integer<std::uint32_t>(isac_table_begin[12 + i]) << (8 * i);
+  if (length < isac::models::parameter_table_bytes(1, 0) || length > room) length = room;
   const Paint paint(16 * 1024);
-  const isac::Status status = loop.start(std::span(isac_table_begin, length < room ? length : room));
+  const isac::Status status = loop.start(std::span(isac_table_begin, length));
   run.start_stack = paint.used();
   return static_cast<std::uint32_t>(status);
 }
