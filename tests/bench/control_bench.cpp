@@ -1,0 +1,164 @@
+// What one control tick costs on this machine: the six-joint step in double and in float, its parts, and the firmware's tick.
+#include <benchmark/benchmark.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <type_traits>
+#include <vector>
+
+#include "../../apps/embedded/simulated_arm.hpp"
+#include "isac/control/deployed.hpp"
+#include "isac/models/arm/soft_arm.hpp"
+#include "isac/record/params.hpp"
+#include "isac/record/tables.hpp"
+
+namespace {
+
+using namespace isac::control;
+using isac::embedded::ArmLoop;
+using isac::embedded::kJoints;
+
+/// What stops a benchmark before it measures something else than it says.
+void need(isac::Status status) {
+  if (!isac::ok(status)) std::abort();
+}
+
+std::vector<std::byte> packed() {
+  const std::filesystem::path params =
+      std::filesystem::path(ISAC_SOURCE_DIR) / "tests/embedded/soft_arm.params.toml";
+  return isac::record::make_tables(isac::record::read_params(params)).binary;
+}
+
+std::unique_ptr<ArmLoop> started_loop() {
+  auto loop = std::make_unique<ArmLoop>();
+  need(loop->start(packed()));
+  return loop;
+}
+
+/// The arm of the table in the scalar S, in position mode.
+template <class S>
+std::unique_ptr<ArmController<S, 6>> arm_of_table(bool predict = false) {
+  auto arm = std::make_unique<ArmController<S, 6>>();
+  isac::models::ParameterTable table;
+  need(isac::models::load_parameter_table(packed(), table));
+  for (std::size_t i = 0; i < kJoints; ++i) {
+    JointSettings<S> settings;
+    int left_out = 0;
+    need(settings_of(table, static_cast<int>(i), settings));
+    need(feed_forward_of(table, static_cast<int>(i), arm->feed_forward[i], left_out));
+    settings.predict_dead_time = predict;
+    need(arm->joints[i].configure(settings));
+    need(arm->joints[i].set_mode(Mode::kPosition));
+  }
+  if constexpr (std::is_same_v<S, double>) {
+    arm->chain = isac::models::soft_arm_chain(isac::models::SoftArmGeometry<double>{});
+  } else {
+    arm->chain = started_loop()->arm().chain;
+  }
+  arm->coupling = isac::models::soft_arm_coupling<S>();
+  return arm;
+}
+
+template <class S>
+struct Tick {
+  std::array<JointMeasurement<S>, kJoints> now{};
+  std::array<ArmReference<S>, kJoints> wanted{};
+};
+
+/// A second of sines on six joints, followed with a small error.
+template <class S>
+std::vector<Tick<S>> motion() {
+  std::vector<Tick<S>> ticks(2000);
+  for (std::size_t k = 0; k < ticks.size(); ++k) {
+    for (std::size_t i = 0; i < kJoints; ++i) {
+      const double rate = 6.283185307179586 * static_cast<double>(i + 1),
+                   phase = rate * 5e-4 * static_cast<double>(k);
+      ticks[k].now[i] = {.angle = S(0.15 * std::sin(phase - 0.02)),
+                         .velocity = S(0.15 * rate * std::cos(phase - 0.02))};
+      ticks[k].wanted[i] = {.angle = S(0.15 * std::sin(phase)),
+                            .velocity = S(0.15 * rate * std::cos(phase)),
+                            .acceleration = S(-0.15 * rate * rate * std::sin(phase))};
+    }
+  }
+  return ticks;
+}
+
+template <class S>
+void run(benchmark::State& state, ArmController<S, 6>& arm) {
+  const auto ticks = motion<S>();
+  std::array<JointCommand<S>, kJoints> command{};
+  int failed = -1;
+  std::size_t k = 0;
+  for (auto _ : state) {
+    need(arm.step(ticks[k].now, ticks[k].wanted, S(5e-4), command, failed));
+    benchmark::DoNotOptimize(command);
+    k = k + 1 == ticks.size() ? 0 : k + 1;
+  }
+}
+
+template <class S>
+void six_joints(benchmark::State& state) {
+  run(state, *arm_of_table<S>());
+}
+template <class S>
+void six_joints_without_compensation(benchmark::State& state) {
+  const auto arm = arm_of_table<S>();
+  arm->compensate = false;
+  run(state, *arm);
+}
+template <class S>
+void six_joints_with_dead_time_predictor(benchmark::State& state) {
+  run(state, *arm_of_table<S>(true));
+}
+template <class S>
+void one_joint(benchmark::State& state) {
+  const auto arm = arm_of_table<S>();
+  const auto ticks = motion<S>();
+  JointCommand<S> command;
+  std::size_t k = 0;
+  for (auto _ : state) {
+    need(arm->joints[0].step(ticks[k].now[0], {.angle = ticks[k].wanted[0].angle}, S(5e-4), command));
+    benchmark::DoNotOptimize(command);
+    k = k + 1 == ticks.size() ? 0 : k + 1;
+  }
+}
+
+/// With encoders, watches and fault machine, in float, as on the microcontroller but with this machine's libm.
+void whole_tick_of_the_firmware(benchmark::State& state) {
+  using namespace isac::embedded;
+  const auto loop = started_loop();
+  SimulatedArm arm;
+  arm.start(*loop);
+  Story story;
+  std::vector<Sample> samples(1200);  // up to the first blow of the story
+  std::vector<Wanted> wanted(samples.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) story.at(static_cast<int>(k), arm, samples[k], wanted[k]);
+  std::int64_t now = 0;
+  std::size_t k = 0;
+  bool armed = false;
+  for (auto _ : state) {
+    samples[k].now = samples[k].sampled = now += kPeriodNs;
+    const Valves valves = loop->tick(samples[k], wanted[k]);
+    armed = armed || valves.state == RunState::kArmed;
+    benchmark::DoNotOptimize(valves);
+    k = k + 1 == samples.size() ? kFirstArm : k + 1;
+  }
+  if (!armed && state.iterations() > 1000) std::abort();
+}
+
+BENCHMARK(six_joints<double>);
+BENCHMARK(six_joints<float>);
+BENCHMARK(six_joints_without_compensation<double>);
+BENCHMARK(six_joints_without_compensation<float>);
+BENCHMARK(six_joints_with_dead_time_predictor<double>);
+BENCHMARK(six_joints_with_dead_time_predictor<float>);
+BENCHMARK(one_joint<double>);
+BENCHMARK(one_joint<float>);
+BENCHMARK(whole_tick_of_the_firmware);
+
+}  // namespace
+
+BENCHMARK_MAIN();
