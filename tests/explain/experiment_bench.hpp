@@ -82,16 +82,12 @@ struct Bench {
           place.project(explain::response(predictor, stem, place.here, {t, values}, weights)));
     };
     explain::Active active{t, t->shapes[t->shapes.size() / 2]};
-    // Amplitudes scale together; where an effect has none its shape does (dead times, widths).
     const auto scaled = [&](double factor) {
       explain::Values v = active.values;
-      bool any = false;
-      for (std::size_t k = 0; k < v.size(); ++k)
-        if (t->free[k] && t->amplitude[k]) {
-          v[k] *= factor;
-          any = true;
-        }
-      if (!any) v[0] *= factor;
+      for (std::size_t k = 0; k < v.size(); ++k) {
+        const double null = t->info().parameters[k].null_value;
+        if (t->free[k] && t->amplitude[k]) v[k] = null + factor * (v[k] - null);
+      }
       return v;
     };
     double low = 1e-4, high = 10;

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <cstdio>
+#include <algorithm>
+#include <cmath>
 
 #include "experiment_bench.hpp"
 #include "isac/explain/experiment_words.hpp"
@@ -21,12 +21,9 @@ TEST(NextExperiment, tells_load_dependent_friction_by_another_mean_pressure) {
   rig.dry = 0.06;
   rig.load_exponent = 1;
   const Bench bench(rig, test::constant_mean_pressure());
-  const auto start = std::chrono::steady_clock::now();
   const Designer designer(bench.tie({"pressure_dependent_friction", "coulomb_friction"}), {});
   const NextExperiment next = designer.design();
-  std::printf("%s\n%.2f s, %zu candidates\n", next.sentence.c_str(),
-              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(),
-              designer.candidates().size());
+  EXPECT_GE(designer.candidates().size(), 100U);
   EXPECT_LT(next.separation_now, 3);
   EXPECT_GT(next.separation_expected, 5);
   ASSERT_FALSE(next.runs.empty());
@@ -42,7 +39,6 @@ TEST(NextExperiment, tells_a_dead_time_from_a_second_lag_by_moving_the_commands)
   rig.dead_time = 0.02;
   const Bench bench(rig, {by_hand(20, 0.35, 0.3), by_hand(20, 0.4, 3.0), clamped(24, 0.1, 0.5, 12)});
   const NextExperiment next = Designer(bench.tie({"dead_time", "second_order_lag"}), {}).design();
-  std::printf("%s\n", next.sentence.c_str());
   EXPECT_GT(next.separation_expected, 5);
   ASSERT_FALSE(next.runs.empty());
   EXPECT_GT(next.runs.front().pressure_swing_kgcm2, 0.05);
@@ -55,7 +51,6 @@ TEST(NextExperiment, asks_for_another_rig_where_no_run_helps) {
   rig.offset = 0.05;
   const Bench bench(rig, test::constant_mean_pressure());
   const NextExperiment next = Designer(bench.tie({"torque_offset", "encoder_offset"}), {}).design();
-  std::printf("%s\n", next.sentence.c_str());
   EXPECT_TRUE(next.runs.empty());
   EXPECT_LT(next.separation_expected, 3);
   EXPECT_NE(next.sentence.find("unloaded"), std::string::npos) << next.sentence;

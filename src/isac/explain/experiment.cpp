@@ -392,12 +392,14 @@ std::optional<Tie> tie_of(const Predictor& predictor, const Library& library, co
     const Step& step = found.steps[s];
     Tie tie;
     const Hypothesis* added = &library.hypotheses[static_cast<std::size_t>(found.added[s])];
+    // The unit by which the search judged this step, and will judge it again: what is missing scatters in it too.
     tie.noise_unit = step.screen.noise_unit;
     for (const Trial& t : step.trials) {
       if (!t.in_set) continue;
       const Hypothesis* h = &library.hypotheses[static_cast<std::size_t>(t.hypothesis)];
       tie.models.push_back({h, t.values});
-      tie.noise_unit = std::max(tie.noise_unit, t.behind.unit);
+      // Between two that hardly differ the unit is that of their rounding.
+      if (t.behind.separation > 1) tie.noise_unit = std::max(tie.noise_unit, t.behind.unit);
     }
     if (tie.models.size() < 2) continue;
     tie.predictor = &predictor;
