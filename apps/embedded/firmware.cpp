@@ -127,7 +127,7 @@ int main() {
     story.at(k, arm, sample, wanted);
     TickRecord counts;
     const Valves valves = counted_tick(sample, wanted, counts, run.tick_stack);
-    TickRecord record = record_of(sample, valves);
+    TickRecord record = record_of(arm, sample, valves);
     record.control_instructions = counts.control_instructions;
     record.tick_instructions = counts.tick_instructions;
     if (started) arm.step(valves.pressure, 1e-9f * static_cast<float>(kPeriodNs));

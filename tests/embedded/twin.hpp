@@ -46,8 +46,8 @@ inline Twin run_twin(const std::vector<std::byte>& table, int ticks = embedded::
     Wanted wanted;
     story.at(k, arm, sample, wanted);
     const Valves valves = loop->tick(sample, wanted);
+    twin.ticks.push_back(record_of(arm, sample, valves));
     if (loop->started()) arm.step(valves.pressure, 1e-9f * static_cast<float>(kPeriodNs));
-    twin.ticks.push_back(record_of(sample, valves));
   }
   return twin;
 }
