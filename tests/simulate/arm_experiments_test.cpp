@@ -118,7 +118,7 @@ double ripple(const Samples& samples, int direction) {
 }
 
 TEST(ArmExperiments, z_moves_with_and_without_compensation) {
-  for (const Arm& arm : {kDiameter, kRadius}) {
+  for (const Arm& arm : {kDiameter, kRadius, kRubbing}) {
     Path path(build(arm), {});
     for (int n = 0; n < 3; ++n) {
       path.to({0, 0, 0.1}, 0.2, 1.0);
@@ -129,14 +129,14 @@ TEST(ArmExperiments, z_moves_with_and_without_compensation) {
       const Follow f = follow(arm, path, compensate, 0);
       behind[compensate ? 1 : 0] = f.behind;
       down[compensate ? 1 : 0] = ripple(f.samples, -1);
-      if (arm.gains < 1) {
+      if (arm.radius < 2 || arm.friction > 0.02) {
         EXPECT_GT(ripple(f.samples, -1), 1.5 * ripple(f.samples, 1));
       }
       show("7.1 %s %s: behind %.1f cm, ripple up %.3f down %.3f m/s\n", arm.name,
            compensate ? "CMBPI" : "MBPI", 100 * f.behind, ripple(f.samples, 1), ripple(f.samples, -1));
     }
     EXPECT_LT(behind[1], behind[0]);
-    EXPECT_NEAR(behind[1], arm.gains < 1 ? 0.064 : 0.054, 0.004);
+    EXPECT_NEAR(behind[1], arm.radius > 1 && arm.friction < 0.02 ? 0.054 : 0.064, 0.004);
     // The seed sees the downward oscillation smoothed by compensation. Here compensation leaves it as it is.
     EXPECT_NEAR(down[1], down[0], 0.15 * down[0]);
   }
@@ -216,7 +216,7 @@ TEST(ArmExperiments, triangle_with_and_without_the_can) {
 }
 
 TEST(ArmExperiments, point_to_point_and_back) {
-  for (const Arm& arm : {kDiameter, kRadius}) {
+  for (const Arm& arm : {kDiameter, kRadius, kRubbing}) {
     double before = 0;
     for (const double v : {0.2, 0.3, 0.4}) {
       const Vec3<double> way = {0, 0.07, 0.09};
@@ -230,12 +230,13 @@ TEST(ArmExperiments, point_to_point_and_back) {
       show("7.6 %s %.1f m/s: behind %.1f cm, off the path %.1f cm\n", arm.name, v, 100 * f.behind,
            100 * off_piece(f.samples, a, a + way));
       const double off = off_piece(f.samples, a, a + way);
-      if (arm.gains < 1) {
-        EXPECT_GT(off, 0.02);
-      } else {
+      if (arm.radius > 1 && arm.friction < 0.02) {
         EXPECT_LT(off, 0.02);  // inside the seed's 4 cm at 0.3 m/s
         EXPECT_GT(f.behind, before);
         EXPECT_NEAR(f.behind / v, 0.16, 0.03);  // the lag of the valves, 0.17 s, times the speed
+      } else {
+        EXPECT_GT(off, 0.02);
+        EXPECT_LT(off, arm.gains < 1 ? 0.08 : 0.04);
       }
       before = f.behind;
     }

@@ -134,7 +134,8 @@ struct Arm {
   const char* name = "";
   double radius = 1, friction = 0, gains = 1, lag = 0.17;
 };
-inline constexpr Arm kDiameter{"diameter", 1, 0.01, 0.25}, kRadius{"radius", 2, 0.01, 1};
+inline constexpr Arm kDiameter{"diameter", 1, 0.01, 0.25}, kRadius{"radius", 2, 0.01, 1},
+    kRubbing{"radius, rubbing", 2, 0.03, 1};
 
 inline double full_torque(const simulate::ArmJointConfig& joint) {
   return joint.muscle.B * joint.wheel_radius * 2 * kPascalPerKgfCm2;
