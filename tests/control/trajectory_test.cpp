@@ -1,5 +1,6 @@
 // R2: a straight line is a straight line, at its speed, or it is refused before anything moves.
-#pragma GCC diagnostic ignored "-Wfloat-conversion"  // the seed's lengths are written as doubles, also for float arms
+#pragma GCC diagnostic ignored \
+    "-Wfloat-conversion"  // the seed's lengths are written as doubles, also for float arms
 #include "isac/control/trajectory.hpp"
 
 #include <gtest/gtest.h>
