@@ -96,7 +96,8 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
   gap.unit = chain == Chain::kTorque ? baseline.output_unit : pressure ? "kg/cm2" : "N m";
   gap.before = scale * raw_residual(predictor, found.baseline.model, chain).rms();
   gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
-  gap.noise_floor = scale * found.floors.white[static_cast<int>(chain)];
+  gap.noise_floor = scale * (chain == Chain::kMotion ? found.weights.sigma[static_cast<int>(chain)]
+                                                     : found.floors.white[static_cast<int>(chain)]);
   if (proof.runs() == 0) return;
   const Sums before = proof.residual(found.baseline.model, chain),
              after = proof.residual(found.model.model, chain);

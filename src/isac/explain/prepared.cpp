@@ -18,8 +18,11 @@ namespace {
 constexpr double kKernelReach =
     6.0;                          // standard deviations: what is cut off the second derivative is below 1e-6
 constexpr double kRowRate = 125;  // Hz: beyond it the kernel has left nothing
-constexpr double kSlowestStep = 0.05;      // s per encoder step: slower is standing still
-constexpr double kWideKernel = 0.020;      // s, for velocities that the encoder resolves badly
+constexpr double kSlowestStep = 0.05;    // s per encoder step: slower is standing still
+constexpr double kTurningWindow = 0.08;  // s to either side
+constexpr double kWideKernel = 0.020;    // s, for velocities that the encoder resolves badly
+constexpr double kSlack = 2.0,
+                 kCarries = 20.0;  // N: a sensor that carries this much as a rule and reads less hangs slack
 constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
 constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
 
@@ -156,8 +159,17 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   run.has_torque = !run.torque.empty() && !run.angle.empty();
   if (run.has_torque) {
     run.smooth_torque = low_pass(run.torque, sigma);
+    // A force amplifier of known lag: T = y + T_f ẏ.
+    const double lag = std::isfinite(rig.force_lag) && joint ? rig.force_lag : 0.0;
+    const auto undo_lag = [&](std::vector<double>& smooth, double width) {
+      if (!(lag > 0)) return;
+      const std::vector<double> rate = low_pass_derivative(run.torque, width, dt, 1);
+      for (std::size_t k = 0; k < smooth.size(); ++k) smooth[k] += lag * rate[k];
+    };
+    undo_lag(run.smooth_torque, sigma);
     if (run.is_free) {
       run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
+      undo_lag(run.slow_torque, smoothing.motion / dt);
       run.slow_acceleration = low_pass_derivative(run.raw_angle, smoothing.motion / dt, dt, 2);
     }
   }
@@ -171,6 +183,14 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     for (std::size_t i = from; i < to; ++i) usable[i] = 0;
   }
   run.usable = std::move(usable);
+  run.loaded = run.usable;
+  for (const auto& force : run.force) {
+    if (force.empty() || !(series::median(force) > kCarries)) continue;
+    for (std::size_t k = 0; k < n; ++k) {
+      if (force[k] >= kSlack) continue;
+      for (std::size_t i = k - std::min(k, reach); i < std::min(n, k + reach + 1); ++i) run.loaded[i] = 0;
+    }
+  }
   return run;
 }
 
@@ -192,8 +212,10 @@ void add_rows(Prepared& data) {
     const auto stride = static_cast<std::size_t>(data.stride);
     const auto put = [&](Chain chain, bool there, double skip, std::size_t step) {
       if (!there) return;
+      const std::vector<unsigned char>& fit =
+          chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable;
       for (std::size_t k = 0; k < run.time.size(); k += step)
-        if (run.usable[k] != 0 && run.time[k] >= skip)
+        if (fit[k] != 0 && run.time[k] >= skip)
           data.rows.push_back({.run = static_cast<unsigned>(r),
                                .sample = static_cast<unsigned>(k),
                                .atom = 0,

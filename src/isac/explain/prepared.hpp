@@ -62,7 +62,8 @@ struct PreparedRun {
   std::vector<double> torque;                          ///< N m (or the output's unit) as read
   std::vector<double> smooth_torque;                   ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
-  std::vector<unsigned char> usable;                   ///< 0 beside gaps and edges
+  std::vector<unsigned char> loaded;  ///< 0 where a force sensor hangs slack: it cannot read a push
+  std::vector<unsigned char> usable;  ///< 0 beside gaps and edges
 };
 
 /// One row of the stacked residual.
@@ -72,7 +73,7 @@ struct Row {
 };
 
 struct Smoothing {
-  double torque = 0.006, motion = 0.012;  ///< s, standard deviation of the Gaussian
+  double torque = 0.006, motion = 0.020;  ///< s, standard deviation of the Gaussian
 };
 
 struct Prepared {

@@ -29,8 +29,9 @@ const std::vector<double>& predicted(const Predictor::FullRate& rate, Chain chai
 const std::vector<double>& read_signal(const PreparedRun& run, Chain chain) {
   switch (chain) {
     case Chain::kTorque:
-    case Chain::kMotion:
       return run.torque;
+    case Chain::kMotion:  // φ̈ is low-passed; so must be what it is held against
+      return run.slow_torque;
     case Chain::kPressure1:
       return run.raw_pressure[0];
     case Chain::kPressure2:
@@ -90,7 +91,9 @@ Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain cha
     const std::vector<double>& measured = read_signal(run, chain);
     if (y.empty()) continue;
     for (std::size_t k = 0; k < y.size(); ++k) {
-      if (run.usable[k] == 0 || run.time[k] < kSkipStart || !std::isfinite(y[k])) continue;
+      if ((chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable)[k] == 0 ||
+          run.time[k] < kSkipStart || !std::isfinite(y[k]))
+        continue;
       sums.squares += (measured[k] - y[k]) * (measured[k] - y[k]);
       sums.signal_squares += measured[k] * measured[k];
       ++sums.samples;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "isac/explain/screen.hpp"
 
@@ -114,7 +115,10 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
   for (std::size_t j = 0; j < x.size(); ++j) refined.values[free[j]] = x[j] * scale[j];
   refined.residual = cost->residual_at(x.data());
   refined.loss = refined.residual.squaredNorm();
-  if (hypothesis.info().state_count > 0) {
+  const bool staircase =
+      hypothesis.info().state_count > 0 && (hypothesis.dry || hypothesis.reads_angle ||
+                                            std::string_view(hypothesis.info().id) == "valve_hysteresis");
+  if (staircase) {
     // Events make the loss a staircase on which derivatives mislead: one parameter after another, ever finer.
     for (const double change : {0.3, 0.1, 0.03, 0.01}) {
       bool better = true;

@@ -350,12 +350,9 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
   for (Screened& s : result.shapes) {
     std::tie(s.T, s.rare_z) = tests[{s.hypothesis, s.shape}];
     Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
-    const double reach = std::max(b.reach, s.reach), T = std::max(b.T, s.T),
-                 rare_z = std::max(b.rare_z, s.rare_z);
+    const double reach = std::max(b.reach, s.reach);
     if (b.hypothesis < 0 || s.gain > b.gain) b = s;
     b.reach = reach;
-    b.T = T;
-    b.rare_z = rare_z;
   }
   result.candidates.clear();
   for (const Screened& s : best)

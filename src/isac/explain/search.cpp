@@ -18,7 +18,7 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
-constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.3;
+constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
 Floors floors_of(const Prepared& data) {
   Floors floors;
@@ -169,23 +169,27 @@ class Search {
     Gate gate;
     gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
     gate.significant = gate.p_value <= options_.significance;
-    const auto consider = [&](double gain, const double* share) {
+    const auto consider = [&](double gain, const double* share, const std::string& what, bool dense) {
       for (int c = 0; c < kChains; ++c) {
         if (rows_[c] == 0 || share[c] <= 0) continue;
         const double size = std::sqrt(gain * share[c] / static_cast<double>(rows_[c])) *
                             found_.weights.sigma[c] / floor_of(c);
+        if (dense) gate.dense_size = std::max(gate.dense_size, size);
         if (size <= gate.size) continue;
         gate.size = size;
         gate.chain = static_cast<Chain>(c);
+        gate.what = what;
       }
     };
     for (const Screened& c : s.candidates)
-      if (c.gain > 0 && significant(c, s)) consider(c.gain, c.chain_share);
+      if (c.gain > 0 && significant(c, s))
+        consider(c.gain, c.chain_share, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
+                 c.T >= s.limit);
     for (const Column& c : s.columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
       double share[kChains] = {};
       share[static_cast<int>(c.chain)] = 1;
-      consider(c.score * c.score / c.norm2, share);
+      consider(c.score * c.score / c.norm2, share, c.name, true);
     }
     gate.material = gate.size >= options_.material;
     return gate;
@@ -319,6 +323,9 @@ class Search {
     step.trials = refit_all(shortlist(step.screen));
     std::erase_if(step.trials, [&](const Trial& t) { return is_unphysical(t); });
     rank(step.trials, step.screen.noise_unit);
+    // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
+    const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
+    step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
     return step;
   }
 
@@ -354,9 +361,10 @@ class Search {
       Step step = step_here();
       if (found_.steps.empty()) found_.gate = step.gate;
       const bool open = step.gate.significant && step.gate.material;
-      say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor ({} blocks of {:.1f} s)",
+      say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
+                             "of {:.1f} s)",
                              found_.added.empty() ? "something" : "something more", step.gate.p_value,
-                             step.gate.size, data_.blocks, data_.block_seconds)
+                             step.gate.size, step.gate.what, data_.blocks, data_.block_seconds)
                : fmt::format("nothing {} is left: p = {:.2g}, {:.2f} of the noise floor",
                              step.gate.significant ? "material" : "significant", step.gate.p_value,
                              step.gate.size));
