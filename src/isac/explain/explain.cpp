@@ -182,6 +182,12 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   add_raw_effects(predictor, found, proof, options, e);
   e.could_hide = could_hide(data, library, found, 8);
   e.not_testable = not_testable(library, found);
+  std::erase_if(e.not_testable, [&](const std::string& id) {  // what was refitted was tested
+    const auto is = [&](const Candidate& c) { return c.id == id; };
+    return std::any_of(e.effects.begin(), e.effects.end(), is) ||
+           std::any_of(e.alternatives.begin(), e.alternatives.end(), is) ||
+           std::any_of(e.rejected.begin(), e.rejected.end(), is);
+  });
   describe(predictor, library, found, proof, options, e);
   return e;
 }

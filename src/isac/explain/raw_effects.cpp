@@ -167,6 +167,12 @@ double less(double rms, double mean_square) {
 
 }  // namespace
 
+namespace {
+
+constexpr double kBesideNamed = 0.35;  // of the gap that the named effects closed
+
+}  // namespace
+
 void add_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof,
                      const ExplainOptions& options, Explanation& e) {
   if (e.verdict == Verdict::kUnknown) return;
@@ -182,6 +188,11 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
       continue;
     const double floor = found.floors.white[static_cast<int>(effect.chain)];
     if (!(effect.rms >= options.material * floor)) continue;
+    // Beside an effect that was named, a small line is what that effect's equation leaves over.
+    const double named =
+        e.effects.empty() ? 0.0
+                          : std::sqrt(std::max(0.0, e.gap.before * e.gap.before - e.gap.after * e.gap.after));
+    if (effect.rms < kBesideNamed * named) continue;
     const double fitted = effect.taken(residual_series(predictor, model, effect.chain));
     const double held = proof.runs() > 0 ? effect.taken(proof.series(model, effect.chain)) : fitted;
     if (fitted <= 0 || held <= 0) {

@@ -18,6 +18,9 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
+constexpr double kNestedLimit =
+    3.0;  // sigma that the parameters of a general case must earn beyond a simpler one
+constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
 Floors floors_of(const Prepared& data) {
@@ -279,7 +282,9 @@ class Search {
     for (bool changed = true; changed;) {
       changed = false;
       for (std::size_t i = 1; i < trials.size(); ++i) {
-        if (!trials[i].in_set || !nests(id_of(trials[0]), id_of(trials[i]))) continue;
+        if (!(trials[i].behind.t < kNestedLimit || trials[i].in_set) ||
+            !nests(id_of(trials[0]), id_of(trials[i])))
+          continue;
         std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                     trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
         mark();
@@ -290,7 +295,7 @@ class Search {
     for (Trial& t : trials)
       if (&t != &trials.front() && t.in_set)
         for (const Trial& simple : trials)
-          if (simple.in_set && nests(id_of(t), id_of(simple))) t.in_set = false;
+          if (simple.in_set && nests(id_of(t), id_of(simple)) && t.behind.t > -kSetLimit) t.in_set = false;
     double sum = 0;
     for (Trial& t : trials) {
       const double c = std::max(t.behind.unit, unit);
@@ -360,7 +365,8 @@ class Search {
     for (;;) {
       Step step = step_here();
       if (found_.steps.empty()) found_.gate = step.gate;
-      const bool open = step.gate.significant && step.gate.material;
+      const bool open = step.gate.significant && step.gate.material &&
+                        (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size);
       say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                              "of {:.1f} s)",
                              found_.added.empty() ? "something" : "something more", step.gate.p_value,
@@ -428,7 +434,10 @@ class Search {
     move_to(with(chosen));
     if (changed) {
       last = step_here();
-      found_.adequate = !(last.gate.significant && last.gate.material);
+      const double first =
+          steps.empty() || steps.front().trials.empty() ? 0.0 : steps.front().trials.front().material;
+      found_.adequate =
+          !(last.gate.significant && last.gate.material && last.gate.size >= kSmallRemainder * first);
     }
     steps.push_back(std::move(last));
     found_.steps = std::move(steps);
