@@ -227,7 +227,8 @@ class Console : public runtime::SessionObserver {
 int log_sweeps(const Words& words, const Given& given) {
   if (words.experiment.empty() && words.plan.empty()) {
     throw Error(ErrorKind::kUsage, "experiment_missing",
-                "experiment is required: name one, like constant-pressure, or a plan with --plan plan.toml; see --help");
+                "experiment is required: name one, like constant-pressure, or a plan with --plan plan.toml; "
+                "see --help");
   }
   const runtime::SessionOptions session = session_of(words, given);
   apps::require_writable(words.json);

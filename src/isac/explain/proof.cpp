@@ -66,11 +66,7 @@ Label label_of(const Predictor& predictor, Chain chain) {
 
 namespace {
 
-/// The torque is compared in free runs too, though no fit used it there.
 bool has_rows(const Prepared& data, std::size_t run, Chain chain) {
-  if (chain == Chain::kTorque && data.runs[run].has_torque &&
-      (data.runs[run].has_pressure || !data.baseline.terms.empty()))
-    return true;
   for (std::size_t i = data.run_begin[run]; i < data.run_begin[run + 1]; ++i)
     if (data.rows[i].chain == chain) return true;
   return false;

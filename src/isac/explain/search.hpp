@@ -38,8 +38,9 @@ struct Gate {
   double p_value = 1;
   double size = 0;  ///< rms of the largest explainable part over the floor, in its best chain
   Chain chain = Chain::kTorque;
-  std::string what;   ///< whose response that is
-  double dense_size = 0;  ///< of the largest that shows throughout its chain, so that flips of blocks speak for it
+  std::string what;  ///< whose response that is
+  double dense_size =
+      0;  ///< of the largest that shows throughout its chain, so that flips of blocks speak for it
 };
 
 struct Step {
