@@ -299,6 +299,7 @@ std::vector<Series> residual_series(const Predictor& predictor, const ModelPoint
     s.interval = run.interval;
     const Predictor::FullRate rate = predictor.full_rate(model, r);
     const bool pressure = chain == Chain::kPressure1 || chain == Chain::kPressure2;
+    const std::vector<unsigned char>& mask = pressure ? run.usable : run.loaded;
     const int side = chain == Chain::kPressure2 ? 1 : 0;
     const std::vector<double>& predicted = pressure                  ? rate.pressure[side]
                                            : chain == Chain::kMotion ? rate.motion
@@ -308,15 +309,15 @@ std::vector<Series> residual_series(const Predictor& predictor, const ModelPoint
                                                                     : run.torque;
     if (!predicted.empty() && predicted.size() == measured.size()) {
       std::size_t first = 0, last = predicted.size();
-      while (first < last && (run.usable[first] == 0 || run.time[first] < kSettling)) ++first;
-      while (last > first && run.usable[last - 1] == 0) --last;
+      while (first < last && (mask[first] == 0 || run.time[first] < kSettling)) ++first;
+      while (last > first && mask[last - 1] == 0) --last;
       s.start = first < last ? run.time[first] : 0.0;
       const auto cut = [&](const std::vector<double>& x) {
         return std::vector<double>(x.begin() + static_cast<std::ptrdiff_t>(first),
                                    x.begin() + static_cast<std::ptrdiff_t>(last));
       };
       for (std::size_t k = first; k < last; ++k)
-        s.value.push_back(run.usable[k] != 0 ? measured[k] - predicted[k] : std::nan(""));
+        s.value.push_back(mask[k] != 0 ? measured[k] - predicted[k] : std::nan(""));
       for (const std::vector<double>& u : run.command)
         if (!u.empty()) s.drivers.push_back(cut(u));
       // A joint that is free answers to what disturbs it: only the command tells what was asked of it.
