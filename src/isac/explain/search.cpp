@@ -168,7 +168,7 @@ class Search {
   }
 
   /// Size of the largest response that is significant, over the floor of its chain.
-  Gate gate_of(const Screen& s) const {
+  Gate gate_of(const Screen& s, const std::set<std::string>& ignored = {}) const {
     Gate gate;
     gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
     gate.significant = gate.p_value <= options_.significance;
@@ -185,7 +185,8 @@ class Search {
       }
     };
     for (const Screened& c : s.candidates)
-      if (c.gain > 0 && significant(c, s))
+      if (c.gain > 0 && significant(c, s) &&
+          ignored.count(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()) == 0)
         consider(c.gain, c.chain_share, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
                  c.T >= s.limit);
     for (const Column& c : s.columns) {
@@ -326,7 +327,13 @@ class Search {
     step.gate = gate_of(step.screen);
     if (!step.gate.significant || !step.gate.material) return step;
     step.trials = refit_all(shortlist(step.screen));
-    std::erase_if(step.trials, [&](const Trial& t) { return is_unphysical(t); });
+    std::set<std::string> unphysical;
+    std::erase_if(step.trials, [&](const Trial& t) {
+      const bool wrong = is_unphysical(t);
+      if (wrong) unphysical.insert(id_of(t));
+      return wrong;
+    });
+    if (!unphysical.empty()) step.gate = gate_of(step.screen, unphysical);
     rank(step.trials, step.screen.noise_unit);
     // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
     const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
