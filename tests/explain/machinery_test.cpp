@@ -183,8 +183,9 @@ TEST(Refine, finds_every_effect_that_the_data_holds_without_noise) {
     EXPECT_LT(refined.residual.norm(), (events ? 0.05 : 0.01) * effect.norm()) << h.info().id;
     for (int i = 0; i < h.info().parameter_count; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      if (h.amplitude[k] && h.parameters() == 1)
+      if (h.amplitude[k] && h.parameters() == 1) {
         EXPECT_NEAR(refined.values[k], truth[k], (events ? 0.01 : 1e-3) * std::abs(truth[k])) << h.info().id;
+      }
     }
     ++found;
   }

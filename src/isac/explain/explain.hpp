@@ -27,10 +27,10 @@
 namespace isac::explain {
 
 struct ExplainOptions {
-  RigFacts rig;
-  BaselineModel baseline;
-  std::vector<std::string> excluded;  ///< effects that are not to be considered
-  double significance = 0.005;        ///< of the whole search, for "something is missing"
+  RigFacts rig{};
+  BaselineModel baseline{};
+  std::vector<std::string> excluded{};  ///< effects that are not to be considered
+  double significance = 0.005;          ///< of the whole search, for "something is missing"
   /// Smaller than this share of the noise floor is immaterial.
   double material = 0.20;
   int most_effects = 3;
@@ -39,7 +39,7 @@ struct ExplainOptions {
   bool traces = true;           ///< fill the columns for pictures
   bool next_experiment = true;  ///< look for the experiment that separates what is tied
   /// What is being tried, what is ruled out and why; one line each.
-  std::function<void(const std::string&)> progress;
+  std::function<void(const std::string&)> progress{};
 };
 
 [[nodiscard]] Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout,
