@@ -10,6 +10,7 @@
 #include "isac/explain/could_hide.hpp"
 #include "isac/explain/describe.hpp"
 #include "isac/explain/experiment.hpp"
+#include "isac/explain/labels.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
@@ -19,29 +20,13 @@
 namespace isac::explain {
 namespace {
 
-const char* subsystem_name(const Hypothesis& h) {
-  switch (h.info().where) {
-    case models::Subsystem::kMuscle:
-      return "muscle";
-    case models::Subsystem::kJoint:
-      return "joint";
-    case models::Subsystem::kPcu:
-      return "pcu";
-    case models::Subsystem::kSensor:
-      return "sensor";
-    case models::Subsystem::kRig:
-      return "rig";
-  }
-  return "";
-}
-
 Candidate candidate_of(const Library& library, const Trial& trial, double confidence) {
   const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(trial.hypothesis)];
   Candidate c;
   c.id = h.id();
   c.form = h.info().id;
   c.name = h.info().term;
-  c.subsystem = subsystem_name(h);
+  c.subsystem = subsystem_name(h.info().where);
   c.equation = h.info().equation;
   c.confidence = confidence;
   c.behind_best = trial.behind.t;

@@ -70,6 +70,23 @@ void add_rest(const Predictor& predictor, ModelPoint& model, unsigned chains, st
   }
 }
 
+/// Tolerances and effects of the chains; a tolerance whose effect is in the model itself gives way to it.
+void add_effects(const ModelPoint& model, std::size_t tolerances, unsigned chains,
+                 std::vector<Coordinate>& out) {
+  for (std::size_t i = 0; i < model.effects.size(); ++i) {
+    const Active& a = model.effects[i];
+    if ((a.hypothesis->chains & chains) == 0) continue;
+    const bool tolerance = i < tolerances;
+    if (tolerance &&
+        std::any_of(model.effects.begin() + static_cast<std::ptrdiff_t>(tolerances), model.effects.end(),
+                    [&](const Active& other) { return other.hypothesis->effect == a.hypothesis->effect; }))
+      continue;
+    for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
+      if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
+        out.push_back(effect_coordinate(a, static_cast<int>(i), p, tolerance));
+  }
+}
+
 /// Rows of the chains asked for, in the order of the data.
 std::vector<Eigen::Index> rows_of(const Prepared& data, unsigned chains) {
   std::vector<Eigen::Index> rows;
@@ -278,19 +295,7 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
   fit.chains = closure(chains, fit.model);
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
   add_rest(predictor, fit.model, fit.chains, fit.coordinates);
-  for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
-    const Active& a = fit.model.effects[i];
-    if ((a.hypothesis->chains & fit.chains) == 0) continue;
-    const bool tolerance = i < fit.tolerances;
-    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
-                                 fit.model.effects.end(), [&](const Active& other) {
-                                   return other.hypothesis->effect == a.hypothesis->effect;
-                                 }))
-      continue;
-    for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
-      if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
-        fit.coordinates.push_back(effect_coordinate(a, static_cast<int>(i), p, tolerance));
-  }
+  add_effects(fit.model, fit.tolerances, fit.chains, fit.coordinates);
   solve(predictor, fit, weights, iterations);
   return fit;
 }
@@ -304,18 +309,7 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
     ModelPoint ignored = fit.model;
     add_rest(predictor, ignored, kAllChains, all);
   }
-  for (std::size_t i = 0; i < fit.model.effects.size(); ++i) {
-    const Active& a = fit.model.effects[i];
-    const bool tolerance = i < fit.tolerances;
-    if (tolerance && std::any_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
-                                 fit.model.effects.end(), [&](const Active& other) {
-                                   return other.hypothesis->effect == a.hypothesis->effect;
-                                 }))
-      continue;
-    for (int p = 0; p < a.hypothesis->info().parameter_count; ++p)
-      if (tolerance ? p == 0 : a.hypothesis->free[static_cast<std::size_t>(p)])
-        all.push_back(effect_coordinate(a, static_cast<int>(i), p, tolerance));
-  }
+  add_effects(fit.model, fit.tolerances, kAllChains, all);
   const auto n = static_cast<Eigen::Index>(predictor.rows());
   Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
   predictor.predict(fit.model, kAllChains, here);

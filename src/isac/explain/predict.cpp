@@ -156,22 +156,18 @@ Predictor::Predictor(const Prepared& data) : data_(&data) {
     if (!seed) base_.back().lower = std::min(base_.back().lower, -1e9);
   }
   if (data.has(Chain::kPressure1) || data.has(Chain::kPressure2)) {
-    gain_ = static_cast<int>(base_.size());
-    base_.push_back({.name = "K_C",
-                     .unit = "-",
-                     .si_per_unit = 1,
-                     .start = 1,
-                     .lower = 0.3,
-                     .upper = 3,
-                     .chains = kPressureChains});
-    lag_ = static_cast<int>(base_.size());
-    base_.push_back({.name = "T_C",
-                     .unit = "s",
-                     .si_per_unit = 1,
-                     .start = 0.17,
-                     .lower = 0.005,
-                     .upper = 3,
-                     .chains = kPressureChains});
+    const auto valve = [&](const char* name, const char* unit, double start, double lower) {
+      base_.push_back({.name = name,
+                       .unit = unit,
+                       .si_per_unit = 1,
+                       .start = start,
+                       .lower = lower,
+                       .upper = 3,
+                       .chains = kPressureChains});
+      return static_cast<int>(base_.size()) - 1;
+    };
+    gain_ = valve("K_C", "-", 1, 0.3);
+    lag_ = valve("T_C", "s", 0.17, 0.005);
   }
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const auto& angle = data.runs[r].raw_angle;
@@ -622,26 +618,8 @@ void read_pressures(const ModelPoint& model, const PreparedRun& run, std::vector
 /// g ∗ x at one sample.
 class Kernel {
  public:
-  explicit Kernel(double sigma) {
-    std::vector<double> impulse(static_cast<std::size_t>(2 * std::ceil(6 * sigma) + 1) + 2, 0.0);
-    impulse[impulse.size() / 2] = 1;
-    weights_ = low_pass(impulse, sigma);
-  }
-  double operator()(const std::vector<double>& x, std::size_t k) const {
-    const auto reach = static_cast<std::ptrdiff_t>(weights_.size() / 2);
-    const auto n = static_cast<std::ptrdiff_t>(x.size());
-    const auto at = static_cast<std::ptrdiff_t>(k);
-    double sum = 0;
-    if (at >= reach && at + reach < n) {
-      const double* p = x.data() + (at - reach);
-      for (std::size_t i = 0; i < weights_.size(); ++i) sum += weights_[i] * p[i];
-      return sum;
-    }
-    for (std::ptrdiff_t i = -reach; i <= reach; ++i)
-      sum += weights_[static_cast<std::size_t>(i + reach)] *
-             x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at + i, 0, n - 1))];
-    return sum;
-  }
+  explicit Kernel(double sigma) : weights_(gaussian(std::max(sigma, 0.3), 0)) {}
+  double operator()(const std::vector<double>& x, std::size_t k) const { return centred_sum(weights_, x, k); }
 
  private:
   std::vector<double> weights_;

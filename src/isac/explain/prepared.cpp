@@ -26,35 +26,6 @@ constexpr double kSlack = 2.0,
 constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
 constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
 
-std::vector<double> gaussian(double sigma, int order) {
-  const int reach = std::max(1, static_cast<int>(std::ceil(kKernelReach * sigma)));
-  std::vector<double> g(static_cast<std::size_t>(2 * reach + 1));
-  double sum = 0;
-  for (int k = -reach; k <= reach; ++k)
-    sum += g[static_cast<std::size_t>(k + reach)] = std::exp(-0.5 * k * k / (sigma * sigma));
-  for (double& v : g) v /= sum;
-  if (order == 0) return g;
-  // Derivatives that are exact on the polynomials they must be exact on, whatever the truncation.
-  std::vector<double> d(g.size());
-  double moment = 0, second = 0;
-  for (int k = -reach; k <= reach; ++k) {
-    const double v = g[static_cast<std::size_t>(k + reach)];
-    second += k * k * v;
-  }
-  for (int k = -reach; k <= reach; ++k) {
-    const auto i = static_cast<std::size_t>(k + reach);
-    if (order == 1) {
-      d[i] = g[i] * k;
-      moment += d[i] * k;
-    } else {
-      d[i] = g[i] * (k * k - second);
-      moment += d[i] * 0.5 * k * k;
-    }
-  }
-  for (double& v : d) v /= moment;
-  return d;
-}
-
 double parse_iso8601(const std::string& text) {
   std::tm tm{};
   double seconds = 0;
@@ -237,25 +208,55 @@ bool Prepared::has(Chain chain) const noexcept {
   return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.chain == chain; });
 }
 
-std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_t first, std::size_t stride) {
-  if (sigma < 0.3) sigma = 0.3;
-  const std::vector<double> g = gaussian(sigma, 0);
+std::vector<double> gaussian(double sigma, int order) {
+  const int reach = std::max(1, static_cast<int>(std::ceil(kKernelReach * sigma)));
+  std::vector<double> g(static_cast<std::size_t>(2 * reach + 1));
+  double sum = 0;
+  for (int k = -reach; k <= reach; ++k)
+    sum += g[static_cast<std::size_t>(k + reach)] = std::exp(-0.5 * k * k / (sigma * sigma));
+  for (double& v : g) v /= sum;
+  if (order == 0) return g;
+  // Derivatives that are exact on the polynomials they must be exact on, whatever the truncation.
+  std::vector<double> d(g.size());
+  double moment = 0, second = 0;
+  for (int k = -reach; k <= reach; ++k) {
+    const double v = g[static_cast<std::size_t>(k + reach)];
+    second += k * k * v;
+  }
+  for (int k = -reach; k <= reach; ++k) {
+    const auto i = static_cast<std::size_t>(k + reach);
+    if (order == 1) {
+      d[i] = g[i] * k;
+      moment += d[i] * k;
+    } else {
+      d[i] = g[i] * (k * k - second);
+      moment += d[i] * 0.5 * k * k;
+    }
+  }
+  for (double& v : d) v /= moment;
+  return d;
+}
+
+double centred_sum(std::span<const double> g, std::span<const double> x, std::size_t at) {
   const auto reach = static_cast<std::ptrdiff_t>(g.size() / 2);
-  const auto n = static_cast<std::ptrdiff_t>(x.size());
+  const auto n = static_cast<std::ptrdiff_t>(x.size()), i = static_cast<std::ptrdiff_t>(at);
+  double sum = 0;
+  if (i >= reach && i + reach < n) {
+    const double* p = x.data() + (i - reach);
+    for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
+    return sum;
+  }
+  for (std::ptrdiff_t k = -reach; k <= reach; ++k)
+    sum += g[static_cast<std::size_t>(k + reach)] *
+           x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
+  return sum;
+}
+
+std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_t first, std::size_t stride) {
+  const std::vector<double> g = gaussian(std::max(sigma, 0.3), 0);
   std::vector<double> out;
   out.reserve(x.size() / stride + 1);
-  for (auto i = static_cast<std::ptrdiff_t>(first); i < n; i += static_cast<std::ptrdiff_t>(stride)) {
-    double sum = 0;
-    if (i >= reach && i + reach < n) {
-      const double* p = x.data() + (i - reach);
-      for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
-    } else {
-      for (std::ptrdiff_t k = -reach; k <= reach; ++k)
-        sum += g[static_cast<std::size_t>(k + reach)] *
-               x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
-    }
-    out.push_back(sum);
-  }
+  for (std::size_t i = first; i < x.size(); i += stride) out.push_back(centred_sum(g, x, i));
   return out;
 }
 
@@ -316,22 +317,9 @@ double white_noise(std::span<const std::vector<double>* const> signals) {
 
 std::vector<double> low_pass_derivative(std::span<const double> x, double sigma, double interval, int order) {
   const std::vector<double> g = gaussian(std::max(sigma, 1.0), order);
-  const auto reach = static_cast<std::ptrdiff_t>(g.size() / 2);
-  const auto n = static_cast<std::ptrdiff_t>(x.size());
   const double scale = order == 1 ? 1 / interval : 1 / (interval * interval);
   std::vector<double> out(x.size());
-  for (std::ptrdiff_t i = 0; i < n; ++i) {
-    double sum = 0;
-    if (i >= reach && i + reach < n) {
-      const double* p = x.data() + (i - reach);
-      for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
-    } else {
-      for (std::ptrdiff_t k = -reach; k <= reach; ++k)
-        sum += g[static_cast<std::size_t>(k + reach)] *
-               x[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, n - 1))];
-    }
-    out[static_cast<std::size_t>(i)] = sum * scale;
-  }
+  for (std::size_t i = 0; i < x.size(); ++i) out[i] = scale * centred_sum(g, x, i);
   return out;
 }
 

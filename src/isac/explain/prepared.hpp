@@ -118,6 +118,10 @@ void cut_blocks(Prepared& data, double block_seconds);
 /// Standard deviation of white noise of one sample, from differences that a smooth signal does not pass.
 [[nodiscard]] double white_noise(std::span<const std::vector<double>* const> signals);
 
+/// Weights of g, or of its first or second derivative per sample: exact on the polynomial that each must be exact on.
+[[nodiscard]] std::vector<double> gaussian(double sigma_samples, int derivative);
+/// Σ g_k x_{i+k} with the weights centred at i; the ends are continued by their last value.
+[[nodiscard]] double centred_sum(std::span<const double> weights, std::span<const double> x, std::size_t i);
 /// g ∗ x at the samples asked for (every `stride`-th from `first`); the ends are continued by their last value.
 [[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples,
                                            std::size_t first = 0, std::size_t stride = 1);
