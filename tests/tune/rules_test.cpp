@@ -93,6 +93,25 @@ TEST(Rules, tangent_of_the_whole_plant_touches_a_finely_simulated_step) {
   }
 }
 
+TEST(LinearStep, a_dead_time_below_zero_continues_the_answer_and_reads_nothing_past_the_command) {
+  const LagPlant plant{.gain = 2, .lag = 0.1, .time_constant = 0.04, .damping = 0.5};
+  std::vector<double> command(300, 1.0);  // exactly filled: the sanitizers see a read behind it
+  command.shrink_to_fit();
+  command[0] = 0;
+  for (std::size_t k = 150; k < command.size(); ++k) command[k] = -1.0;
+  const double interval = 0.001, h = 1e-5;
+  const auto at = [&](double dead_time) {
+    LagPlant moved = plant;
+    moved.dead_time = dead_time;
+    return simulate(moved, interval, command);
+  };
+  const std::vector<double> before = at(-h), here = at(0), after = at(h), ahead = at(-2.5 * interval);
+  // Exact answers: both one-sided slopes are −ẏ; they differ by ÿ h, and ÿ is at most 2 · 2/T_C T_J = 1e3 rad/s².
+  for (std::size_t k = 1; k + 1 < here.size(); ++k)
+    EXPECT_NEAR((after[k] - here[k]) / h, (here[k] - before[k]) / h, 1e3 * h) << k;
+  for (const double y : ahead) EXPECT_TRUE(std::isfinite(y));
+}
+
 TEST(Rules, joint_latency_goes_over_smoothly_from_swinging_to_creeping) {
   const auto below = joint_step_shape({1, 0.1, 0.04, 0.9999, 0}),
              above = joint_step_shape({1, 0.1, 0.04, 1.0001, 0});

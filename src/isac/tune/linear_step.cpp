@@ -72,8 +72,10 @@ void simulate_into(const LagPlant& plant, double interval, std::span<const doubl
   const Step first = step_of(system, part), second = step_of(system, interval - part);
   const Eigen::Matrix3d phi = second.phi * first.phi;
   const State old_gain = second.phi * first.gamma, new_gain = second.gamma;
+  // At a dead time of 0 a derivative's step goes below it: the command is then asked for ahead, and held after its last row.
+  const auto last = static_cast<std::ptrdiff_t>(command.size()) - 1;
   const auto delayed = [&](std::ptrdiff_t k) {
-    return command[static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, k))] - command[0];
+    return command[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))] - command[0];
   };
   State x = State::Zero();
   angle.resize(command.size());

@@ -19,6 +19,7 @@
 namespace isac::tune {
 
 /// φ at every sample of a command on an even grid, from rest at command[0]; φ(t_0) = 0. command[k] acts from t_k + L on.
+/// L < 0, which a derivative at L = 0 asks for, is the smooth continuation: the command is looked up ahead, and held after its end.
 [[nodiscard]] std::vector<double> simulate(const LagPlant& plant, double interval,
                                            std::span<const double> command);
 
