@@ -107,7 +107,7 @@ void add_numbers(const Predictor& predictor, const Found& found, Explanation& e)
     const BaseParameter& b = predictor.base()[j];
     BaseChange change;
     change.name = b.name;
-    change.unit = b.unit;
+    change.unit = axis_unit(b.unit, predictor.data().baseline);
     change.before = found.baseline.model.base[j] / b.si_per_unit;
     change.after = found.model.model.base[j] / b.si_per_unit;
     const double moved = std::abs(change.after - change.before);
@@ -183,6 +183,18 @@ std::string largest_hidden(const Explanation& e) {
   if (e.could_hide.empty()) return "";
   const CouldHide& most = e.could_hide.front();
   return fmt::format(" What could hide most is {}, up to {}.", most.id, with_unit(most.size, most.unit));
+}
+
+/// Every unit that the catalogue or a variable brought along, as it is on this axis.
+void tell_in_units_of(const BaselineModel& baseline, Explanation& e) {
+  const auto mend = [&](std::string& unit) { unit = axis_unit(unit, baseline); };
+  for (auto* candidates : {&e.effects, &e.alternatives, &e.rejected})
+    for (Candidate& c : *candidates)
+      for (Estimated& p : c.parameters) mend(p.unit);
+  for (Estimated& p : e.base) mend(p.unit);
+  for (CouldHide& one : e.could_hide) mend(one.unit);
+  for (Region& region : e.where) mend(region.unit);
+  if (e.unknown) mend(e.unknown->variable_unit);
 }
 
 }  // namespace
@@ -267,6 +279,7 @@ void describe(const Predictor& predictor, const Library& library, const Found& f
               const ExplainOptions& options, Explanation& e) {
   const Chain chain = chain_of(predictor.data(), e.gap.signal);
   add_numbers(predictor, found, e);
+  tell_in_units_of(predictor.data().baseline, e);
   add_signals(predictor, library, found, e);
   add_waterfall(predictor, library, found, proof, chain, e);
   if (options.traces) {

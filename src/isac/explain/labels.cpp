@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "isac/core/units.hpp"
 
@@ -21,6 +22,23 @@ Label label_of(const Prepared& data, Chain chain) {
       return {"p2", "kg/cm2", 1 / kPascalPerKgfCm2};
   }
   return {data.baseline.output, data.baseline.output_unit, 1};
+}
+
+std::string axis_unit(const std::string& unit, const BaselineModel& baseline) {
+  if (baseline.position_unit == "rad") return unit;
+  constexpr std::string_view kTorque = "N m", kAngle = "rad";
+  if (unit == "kg m2") return "kg";
+  std::string text = unit;
+  if (text.starts_with(kTorque)) {
+    text.replace(0, kTorque.size(), "N");
+    // What follows is a power of time where the term grows with a power of speed.
+    if (const auto time = text.find(" s"); time != std::string::npos) {
+      const std::string power = text.substr(time + 2);
+      text += "/m" + power;
+    }
+  }
+  if (const auto at = text.find(kAngle); at != std::string::npos) text.replace(at, kAngle.size(), "m");
+  return text;
 }
 
 const char* subsystem_name(models::Subsystem where) noexcept {

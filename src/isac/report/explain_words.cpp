@@ -106,10 +106,10 @@ std::string region_sentence(const explain::Region& region) {
   std::string text = subsystem_in_words(region.subsystem) + ", " + signal_in_words(region.signal);
   if (std::isfinite(region.low) && std::isfinite(region.high)) {
     const std::string unit = pretty_unit(region.unit);
-    text += ": " + variable_in_words(region.variable) + " from " + number(region.low, 3) + " to " +
-            number(region.high, 3) + (unit.empty() ? "" : " " + unit);
+    text += ": " + variable_in_words(region.variable, region.unit) + " from " + number(region.low, 3) +
+            " to " + number(region.high, 3) + (unit.empty() ? "" : " " + unit);
   } else if (!region.variable.empty()) {
-    text += ": " + variable_in_words(region.variable);
+    text += ": " + variable_in_words(region.variable, region.unit);
   }
   if (std::isfinite(region.share)) text += " holds " + percent(region.share) + " of what can be explained";
   return text;
@@ -127,7 +127,10 @@ std::string subsystem_in_words(const std::string& subsystem) {
   return subsystem.empty() ? "rig" : subsystem;
 }
 
-std::string variable_in_words(const std::string& variable) {
+std::string variable_in_words(const std::string& variable, const std::string& unit) {
+  if (unit == "m" && variable == "angle") return "position x";
+  if (unit == "m/s" && variable == "velocity") return "speed v";
+  if (unit == "m/s" && variable == "speed") return "speed |v|";
   static const std::map<std::string, std::string> kWords{{"delta_pressure", "pressure difference Δp"},
                                                          {"mean_pressure", "mean pressure"},
                                                          {"angle", "angle φ"},
