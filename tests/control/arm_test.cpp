@@ -81,6 +81,56 @@ TEST(Compensation, shares_of_inertia_are_none_the_first_joints_and_all) {
   EXPECT_NEAR(power, energy, 1e-12 * energy);
 }
 
+/// An arm nobody has built: any twists, masses on any links, any coupling.
+Chain<double, 6> random_chain(std::mt19937_64& random) {
+  std::uniform_real_distribution<double> number(-1, 1);
+  Chain<double, 6> chain;
+  for (auto& link : chain.links) link = {3 * number(random), number(random), number(random), number(random)};
+  chain.mass_count = 5;
+  for (int m = 0; m < chain.mass_count; ++m) {
+    chain.masses[static_cast<std::size_t>(m)] = {
+        static_cast<int>(random() % 6), {number(random), number(random), number(random)}, 1 + number(random)};
+  }
+  chain.gravity = {9.81 * number(random), 9.81 * number(random), 9.81 * number(random)};
+  return chain;
+}
+
+TEST(Compensation, is_the_gravity_and_the_mass_matrix_of_the_models_for_any_arm) {
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> number(-3, 3);
+  LinkTwists<double, 6> twists;  // kept from arm to arm: another arm must be noticed
+  for (int k = 0; k < 200; ++k) {
+    const Chain<double, 6> chain = random_chain(random);
+    Coupling<double, 6> coupling{};
+    JointVector<double, 6> phi, wanted;
+    for (std::size_t i = 0; i < 6; ++i) {
+      phi[i] = number(random);
+      wanted[i] = number(random);
+      for (double& entry : coupling[i]) entry = number(random);
+    }
+    const auto theta = multiply<double, 6>(coupling, phi), bend = multiply<double, 6>(coupling, wanted);
+    const auto gravity = gravity_torque(chain, theta);
+    const auto mass = mass_matrix(chain, theta);
+    for (const InertiaShare share : {InertiaShare::kNone, InertiaShare::kFirstJoint, InertiaShare::kWhole}) {
+      JointVector<double, 6> torque{};
+      double size = 1;
+      for (std::size_t i = 0; i < 6; ++i) {
+        torque[i] = -gravity[i];
+        for (std::size_t j = 0; j < 6; ++j) {
+          const bool counts =
+              share == InertiaShare::kWhole || (share == InertiaShare::kFirstJoint && i + j == 0);
+          if (counts) torque[i] += mass[i][j] * bend[j];
+          size += std::abs(mass[i][j] * bend[j]);
+        }
+      }
+      const auto expected = multiply_transposed<double, 6>(coupling, torque);
+      const auto found = compensation_torque<double, 6>(chain, coupling, phi, wanted, share, twists);
+      for (std::size_t i = 0; i < 6; ++i)
+        EXPECT_NEAR(found[i], expected[i], 1e-13 * size);  // some hundred roundings of 1e-16 each
+    }
+  }
+}
+
 // One joint with a weight on a lever: a pendulum about a level axis, in the arm's own words.
 Chain<double, 1> pendulum(double mass, double lever) {
   Chain<double, 1> chain;

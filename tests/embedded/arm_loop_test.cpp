@@ -1,16 +1,10 @@
 // The firmware's loop on the host: the story's faults are found, nothing is asked of the heap, damaged tables never arm.
 #include <gtest/gtest.h>
 
-#include <new>
 #include <set>
 
 #include "../runtime/counted_new.hpp"
 #include "twin.hpp"
-
-/// Counted like the others; without it a sanitizer's own would be freed by counted_new.cpp.
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  return ::operator new(size);
-}
 
 namespace {
 

@@ -49,7 +49,7 @@ class ArmController {
         const Mode mode = joints[i].mode();
         acceleration[i] = mode == Mode::kPosition ? wanted[i].acceleration : S(0.0);
       }
-      load = compensation_torque<S, N>(chain, coupling, angle, acceleration, inertia);
+      load = compensation_torque<S, N>(chain, coupling, angle, acceleration, inertia, twists_);
     }
     time_ += dt;
     for (std::size_t i = 0; i < kJoints; ++i) {
@@ -91,6 +91,7 @@ class ArmController {
     }
   }
 
+  LinkTwists<S, N> twists_;
   PerJoint<S> delta_pressure_{};  ///< Pa, commanded last
   S time_{};
 };

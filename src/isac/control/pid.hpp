@@ -102,8 +102,9 @@ class Pid {
     const PidGains<S>& k = settings_.gains;
     const S error = reference - measurement;
     const S d = signal(reference, measurement);
+    const bool differentiates = has_last_ && k.derivative != S(0.0);  // else the division is for nothing
     const S rate =
-        has_last_
+        differentiates
             ? S((settings_.derivative_filter * rate_ + (d - last_)) / (settings_.derivative_filter + dt))
             : S(0.0);
     const S increment = k.integral * error * dt;
