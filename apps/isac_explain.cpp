@@ -13,6 +13,7 @@
 #include "explain/plan.hpp"
 #include "explain/summary.hpp"
 #include "isac/explain/explain.hpp"
+#include "isac/explain/step_records.hpp"
 #include "isac/record/csv_writer.hpp"
 #include "isac/record/params.hpp"
 #include "isac/record/plan_file.hpp"
@@ -58,7 +59,9 @@ int run(Words words) {
   options.traces = !words.report.empty();
   apps::Progress progress(words.verbose);
   options.progress = [&progress](const std::string& line) { progress.say(line); };
-  const explain::Explanation answer = explain::explain(inputs.runs, inputs.heldout, options);
+  const explain::Explanation answer = explain::only_pressures(inputs.runs)
+                                          ? explain::explain_steps(inputs.runs)
+                                          : explain::explain(inputs.runs, inputs.heldout, options);
   inputs.runs = {};
   progress.end();
 

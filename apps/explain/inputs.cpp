@@ -9,15 +9,16 @@
 #include "common/dataset.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/step_records.hpp"
 #include "isac/models/effect_queries.hpp"
 #include "isac/record/model_file.hpp"
 
 namespace isac::apps {
 namespace {
 
-constexpr std::array<std::string_view, 12> kRead = {"time", "angle",  "velocity",    "p1",
-                                                    "p2",   "p1_cmd", "p2_cmd",      "F1",
-                                                    "F2",   "torque", "temperature", "p_supply"};
+constexpr std::array<std::string_view, 14> kRead = {
+    "time", "angle", "velocity", "p1",          "p2",       "p1_cmd",   "p2_cmd",
+    "F1",   "F2",    "torque",   "temperature", "p_supply", "pressure", "pressure_cmd"};
 
 /// The seed's joint, or the sum of terms of a model.toml; inertia among the terms says that the output drives the axis, as in
 /// the fit of a joint.
@@ -100,14 +101,14 @@ ExplainInputs read_inputs(const ExplainWords& words) {
   }
   if (inputs.title.empty()) inputs.title = inputs.rig.name;
   inputs.facts = facts_of(inputs.rig, !files.rig.empty());
+  record::ReadOptions reading{.map = parse_maps(words.maps), .require_time = true, .hash = words.hash};
+  inputs.runs = read_runs(files.runs, reading, inputs.baseline);
   if ((uses_pressure(inputs.baseline) || inputs.baseline.output == "torque") &&
-      !std::isfinite(inputs.facts.wheel_radius)) {
+      !std::isfinite(inputs.facts.wheel_radius) && !explain::only_pressures(inputs.runs)) {
     throw Error(ErrorKind::kBadInput, "wheel_missing",
                 "the chain wheel is not known; give --rig rig.toml with chain_wheel_diameter in [joint]");
   }
 
-  record::ReadOptions reading{.map = parse_maps(words.maps), .require_time = true, .hash = words.hash};
-  inputs.runs = read_runs(files.runs, reading, inputs.baseline);
   inputs.sources = sources_of(inputs.runs);
   for (const series::Recording& run : inputs.runs) {
     const series::Column* position = run.find(inputs.baseline.position);

@@ -14,11 +14,6 @@ namespace {
 constexpr std::size_t kTracePoints = 2000;
 constexpr double kWorthTelling = 0.03;  // relative change of a base parameter
 
-std::string upper_first(std::string text) {
-  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
-  return text;
-}
-
 std::string with_unit(double value, const std::string& unit) {
   return rounded(value) + (unit.empty() || unit == "-" ? "" : " " + unit);
 }

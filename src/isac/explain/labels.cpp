@@ -41,6 +41,11 @@ std::string axis_unit(const std::string& unit, const BaselineModel& baseline) {
   return text;
 }
 
+std::string upper_first(std::string text) {
+  if (!text.empty() && text[0] >= 'a' && text[0] <= 'z') text[0] = static_cast<char>(text[0] - 'a' + 'A');
+  return text;
+}
+
 const char* subsystem_name(models::Subsystem where) noexcept {
   switch (where) {
     case models::Subsystem::kMuscle:

@@ -19,6 +19,7 @@ struct Label {
 /// A unit of the catalogue on this axis: on a linear one rad is m, a torque is a force and "kg m2" a mass; what grows with
 /// a power of speed or angle has that power of m beneath ("N m s3" is "N s3/m3").
 [[nodiscard]] std::string axis_unit(const std::string& unit, const BaselineModel& baseline);
+[[nodiscard]] std::string upper_first(std::string text);
 [[nodiscard]] const char* subsystem_name(models::Subsystem where) noexcept;
 /// Three significant digits, without a power of ten where four zeros do.
 [[nodiscard]] std::string rounded(double value, int digits = 3);
