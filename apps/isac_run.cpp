@@ -120,6 +120,7 @@ void add_common(CLI::App& app, apps::RunWords& words) {
       "--params", words.params,
       "Parameters and gains: params.toml or the packed table (sim: and replay: without: the seed's)");
   app.add_option("--rig", words.rig, "The rig file: limits, calibration, card");
+  app.add_option("--arm", words.arm, "The arm file: masses for the compensation, links for a line, limits");
   app.add_option("-o,--output", words.log, "Record the run as CSV (never replaces a file)");
   app.add_option(
       "--flight", words.flight,
@@ -133,9 +134,17 @@ void add_live(CLI::App& app, apps::RunWords& words) {
   app.add_option("--duration", words.duration, "Of the motion, e.g. \"5 s\"");
   app.add_option("--rate", words.rate, "Cycles per second; the position loop runs at every tenth")
       ->capture_default_str();
-  app.add_option("--controller", words.controller, "mbpi: torque from the model; pi: torque measured")
-      ->check(CLI::IsMember({"mbpi", "pi"}))
-      ->capture_default_str();
+  app.add_option("--controller", words.controller,
+                 "mbpi: torque from the model; cmbpi: the same with the arm's weight compensated (default "
+                 "with --arm); "
+                 "pi: torque measured; pid: angle to pressure")
+      ->check(CLI::IsMember({"mbpi", "cmbpi", "pi", "pid"}));
+  app.add_option(
+      "--pid", words.pid,
+      "K_P, K_I, K_D of --controller pid per rad, rad s, rad/s: \"0.4, 7, 0.08 kg/cm2\" (the seed's: the "
+      "default without --params)");
+  app.add_flag("--predictor", words.predictor,
+               "Predict the valves' dead time away (needs it and the inertia)");
   app.add_option("--pace", words.pace,
                  "sim:, replay: as fast as it can (virtual) or by the wall clock (real)")
       ->check(CLI::IsMember({"virtual", "real"}))
@@ -179,11 +188,19 @@ int main(int argc, char** argv) {
       app.add_subcommand("trajectory", "Points of joint angles, all checked before anything moves");
   trajectory->add_option("points", words.points, "CSV with time and angle, or phi1 ... of all joints")
       ->required();
+  CLI::App* line = app.add_subcommand(
+      "line", "The hand along straight pieces, points 2 mm apart, all checked before anything moves");
+  line->add_option("way", words.way, "Pieces: \"by 0, 0, 0.1 m\" from where it is, \"to 0.3, 0.2, 0.4 m\"")
+      ->required();
+  line->add_option("--speed", words.speed, "Of the hand")->capture_default_str();
+  line->add_option(
+      "--start", words.start,
+      "Six joint angles from which the way begins, e.g. \"0, 0.1, 0, 0, 0, 0 rad\" (default: the middle)");
   CLI::App* torque = app.add_subcommand("torque", "Hold a torque");
   torque->add_option("--torque", words.torque, "E.g. \"1.5 N m\"")->required();
   torque->add_option("--joint", words.joint, "Which joint; the others have 0 N m")->capture_default_str();
   CLI::App* hand = app.add_subcommand("hand", "Torque 0: the joint is led by hand");
-  for (CLI::App* live : {position, trajectory, torque, hand}) {
+  for (CLI::App* live : {position, trajectory, line, torque, hand}) {
     add_common(*live, words);
     add_live(*live, words);
   }

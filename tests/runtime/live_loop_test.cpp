@@ -342,7 +342,8 @@ TEST(ControlLoop, vents_however_the_run_ends) {
 
 TEST(ControlLoop, refuses_a_measured_torque_without_force_sensors) {
   record::Rig rig;
-  runtime::ControlSettings settings = runtime::testbed_control_settings(rig, {.measured_torque = true});
+  runtime::ControlSettings settings =
+      runtime::testbed_control_settings(rig, {.structure = control::Structure::kCascade});
   ControlCard card;
   runtime::JointWiring wiring = runtime::wire_joints(rig, card.shape(), 1);
   wiring.joint[0].F1 = {};

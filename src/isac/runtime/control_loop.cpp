@@ -22,7 +22,10 @@ ControlLoop::ControlLoop(card::Card& card, const JointWiring& wiring,
       settings_(settings),
       period_ns_(settings.fault.period),
       machine_(settings.fault) {
-  controller_.compensate = false;  // an arm's masses belong to its arm file
+  controller_.compensate = settings.compensate;
+  controller_.chain = settings.chain;
+  controller_.coupling = settings.coupling;
+  controller_.inertia = settings.inertia;
   for (auto& watch : input_watch_)
     watch = control::InputWatch(wiring.shape.input_max_code, settings.samples_at_end);
   for (int k = 0; k < wiring.joints; ++k) {

@@ -36,6 +36,12 @@ struct ControlSettings {
   int samples_at_end = 200;                                 ///< of an analogue input at an end of its range
   double run_up = 1.5;             ///< s from vented to p0: eight lags of the valve unit
   double velocity_filter = 0.010;  ///< s
+
+  // PI-CMBPI (seed 5.4) of an arm; without: nothing is compensated.
+  bool compensate = false;
+  models::Chain<double, kMaxJoints> chain;
+  models::Coupling<double, kMaxJoints> coupling{};
+  control::InertiaShare inertia = control::InertiaShare::kFirstJoint;
 };
 
 /// Where the loop stands, for whoever decides what is wanted next.

@@ -17,6 +17,8 @@
 namespace isac::runtime {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr double kOvershoot = 1.1, kSpeedMargin = 1.5, kForceWarning = 0.9;
 
 [[noreturn]] void refuse(const std::string& code, const std::string& text,
@@ -47,7 +49,8 @@ void finish(ControlSettings& settings, const record::Rig& rig, const SetupWishes
   settings.fault.stale_after = std::max<std::int64_t>(5'000'000, 2 * settings.fault.period);
   for (auto& joint : settings.joint) {
     narrow(joint.limits, rig.limits);
-    if (wishes.measured_torque) joint.structure = control::Structure::kCascade;
+    joint.structure = wishes.structure;
+    if (wishes.structure == control::Structure::kPid) joint.position = wishes.pid;
   }
   settings.watch.fill(watch_of(rig.limits, wishes));
   settings.encoder.fill(
@@ -103,6 +106,16 @@ ControlSettings control_settings(const models::ParameterTable& table, const reco
              {});
     }
     left_out += others;
+    control::JointSettings<double>& own = settings.joint[i];
+    own.predict_dead_time = wishes.predict_dead_time;
+    if (wishes.predict_dead_time && !(own.inertia > 0 && own.valve.dead_time > 0)) {
+      refuse("predictor_without_model",
+             joint +
+                 " has no inertia or no dead time of its valve in these parameters; identify the valve unit "
+                 "and give the "
+                 "inertia, or leave the predictor out",
+             {});
+    }
   }
   if (left_out > 0) {
     warnings.push_back(
@@ -112,6 +125,79 @@ ControlSettings control_settings(const models::ParameterTable& table, const reco
   }
   finish(settings, rig, wishes);
   return settings;
+}
+
+control::PidGains<double> testbed_pid_gains() noexcept {
+  return {.proportional = 0.4 * kPascalPerKgfCm2,
+          .integral = 7.0 * kPascalPerKgfCm2,
+          .derivative = 0.08 * kPascalPerKgfCm2};
+}
+
+void compensate_arm(ControlSettings& settings, const record::ArmFile& arm,
+                    const models::ParameterTable& table, const fs::path& arm_file) {
+  if (arm.joints != table.joint_count) {
+    refuse(
+        "arm_of_other_joints",
+        fmt::format("the arm has {} joints and the parameters are of {}; give the arm that belongs to them",
+                    arm.joints, table.joint_count),
+        arm_file);
+  }
+  settings.compensate = true;
+  settings.chain = arm.chain;
+  settings.coupling = arm.coupling;
+  for (std::size_t i = 0; i < arm.middle.size(); ++i) settings.chain.links[i].theta_offset += arm.middle[i];
+  if (table.has_masses) {
+    if (arm.mass_names.size() != table.masses.size()) {
+      refuse("arm_of_other_masses",
+             fmt::format(
+                 "the arm has {} masses and the parameters have {}; identify the masses with this arm file",
+                 arm.mass_names.size(), table.masses.size()),
+             arm_file);
+    }
+    for (std::size_t m = 0; m < table.masses.size(); ++m) settings.chain.masses[m].mass = table.masses[m];
+  }
+  for (int k = 0; k < arm.joints; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    control::JointLimits<double>& limits = settings.joint[i].limits;
+    limits.angle_low = std::max(limits.angle_low, arm.limits.lower[i]);
+    limits.angle_high = std::min(limits.angle_high, arm.limits.upper[i]);
+  }
+}
+
+control::ArmReach<double> reach_of(const record::ArmFile& arm, const ControlSettings& settings,
+                                   const fs::path& arm_file) {
+  control::ArmReach<double> reach;
+  reach.geometry.l1 = arm.chain.links[0].d;
+  reach.geometry.l2 = arm.chain.links[2].d;
+  reach.geometry.l3 = -arm.chain.links[2].a;
+  reach.geometry.l4 = arm.chain.links[3].d;
+  reach.geometry.l5 = -arm.chain.tool.x;
+  const models::Chain<double, 6> known = models::soft_arm_chain(reach.geometry);
+  constexpr double kSame = 1e-9;  // m, rad: what a length in a text file is good for
+  bool same = arm.joints == 6 && arm.chain.tool_link == known.tool_link &&
+              std::abs(arm.chain.tool.y) + std::abs(arm.chain.tool.z) < kSame;
+  for (std::size_t i = 0; i < known.links.size(); ++i) {
+    const models::DhLink<double>&a = arm.chain.links[i], &b = known.links[i];
+    same = same && std::abs(a.alpha - b.alpha) + std::abs(a.a - b.a) + std::abs(a.d - b.d) +
+                           std::abs(a.theta_offset - b.theta_offset) <
+                       kSame;
+  }
+  if (!same) {
+    refuse("arm_without_inverse",
+           "is not built like the seed's arm (table 4.1), whose inverse kinematics alone is known; give "
+           "points of joint "
+           "angles to isac-run trajectory instead",
+           arm_file);
+  }
+  reach.coupling = arm.coupling;
+  reach.middle = arm.middle;
+  for (std::size_t i = 0; i < reach.speed.size(); ++i) {
+    const control::JointLimits<double>& limits = settings.joint[i].limits;
+    reach.limits.lower[i] = limits.angle_low;
+    reach.limits.upper[i] = limits.angle_high;
+    reach.speed[i] = limits.speed;
+  }
+  return reach;
 }
 
 ControlSettings testbed_control_settings(const record::Rig& rig, const SetupWishes& wishes) {

@@ -16,7 +16,9 @@
 #include <string>
 
 #include "isac/control/deployed.hpp"
+#include "isac/control/trajectory.hpp"
 #include "isac/core/estimated.hpp"
+#include "isac/record/arm_file.hpp"
 #include "isac/record/rig.hpp"
 #include "isac/runtime/control_loop.hpp"
 
@@ -32,14 +34,29 @@ struct LoadedTable {
 [[nodiscard]] LoadedTable load_table(const std::filesystem::path& path);
 
 struct SetupWishes {
-  double rate = 2000;                             ///< Hz, of the inner loop
-  bool measured_torque = false;                   ///< PI-PI instead of PI-MBPI
+  double rate = 2000;  ///< Hz, of the inner loop
+  control::Structure structure = control::Structure::kModelBased;
+  control::PidGains<double> pid{};                ///< of kPid alone: Pa/rad, Pa/(rad s), Pa s/rad
+  bool predict_dead_time = false;                 ///< where the table has inertia and a dead time
   double following = 0.35, following_time = 0.5;  ///< rad, s
 };
 
 /// Of all joints of the table. `warnings` gets what was left out (effects that cannot be fed forward).
 [[nodiscard]] ControlSettings control_settings(const models::ParameterTable& table, const record::Rig& rig,
                                                const SetupWishes& wishes, Warnings& warnings);
+
+/// The gains that the seed ran its PID with after Ziegler and Nichols (5.1): 0.4, 7 and 0.08 kg/cm² per rad, rad s, rad/s.
+[[nodiscard]] control::PidGains<double> testbed_pid_gains() noexcept;
+
+/// PI-CMBPI: the arm's chain and coupling, the table's masses where it has them (else the file's), and the narrower limits.
+/// The arm must have as many joints as the table.
+void compensate_arm(ControlSettings& settings, const record::ArmFile& arm,
+                    const models::ParameterTable& table, const std::filesystem::path& arm_file);
+
+/// What a straight line must know. Only for the links of the seed's arm (table 4.1, with lengths of one's own), because only
+/// theirs is the inverse known.
+[[nodiscard]] control::ArmReach<double> reach_of(const record::ArmFile& arm, const ControlSettings& settings,
+                                                 const std::filesystem::path& arm_file);
 
 /// The seed's testbed with the gains of its section 5.3, for a simulated rig without parameters.
 [[nodiscard]] ControlSettings testbed_control_settings(const record::Rig& rig, const SetupWishes& wishes);

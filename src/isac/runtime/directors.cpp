@@ -12,6 +12,8 @@
 namespace isac::runtime {
 namespace {
 
+constexpr double kApproachSpeed = 0.5;  // rad/s, of the joint with the longest way to the start pose
+
 std::string joint_column(const char* name, int joint, int joints) {
   return joints == 1 ? std::string(name) : std::string(name) + "_" + std::to_string(joint + 1);
 }
@@ -79,6 +81,7 @@ JointAim MotionDirector::aim(double time) const noexcept {
     case Motion::Kind::kTorque:
       return {.torque = motion_.size};
     case Motion::Kind::kPoints:
+    case Motion::Kind::kLine:
       break;
   }
   return {};
@@ -96,16 +99,46 @@ void MotionDirector::follow_points(double time, Wanted& wanted) noexcept {
   }
 }
 
+bool MotionDirector::follow_line(double time, Wanted& wanted) noexcept {
+  const LinePath& path = *motion_.path;
+  double furthest = 0;
+  for (std::size_t j = 0; j < found_.size(); ++j)
+    furthest = std::max(furthest, std::abs(path.start()[j] - found_[j]));
+  // 3 u² − 2 u³ is steepest in its middle, 1.5 times the mean
+  const double approach = 1.5 * furthest / kApproachSpeed, along = time - approach - motion_.rest;
+  if (along >= path.duration() + motion_.duration) return false;
+  control::LinePoint<double> point;
+  if (time < approach) {
+    const double u = time / approach;
+    for (std::size_t j = 0; j < found_.size(); ++j) {
+      const double way = path.start()[j] - found_[j];
+      point.angle[j] = found_[j] + way * u * u * (3 - 2 * u);
+      point.velocity[j] = way * 6 * u * (1 - u) / approach;
+      point.acceleration[j] = way * 6 * (1 - 2 * u) / (approach * approach);
+    }
+  } else {
+    point = path.at(along);
+  }
+  for (std::size_t j = 0; j < found_.size(); ++j) {
+    wanted.joint[j] = {
+        .angle = point.angle[j], .velocity = point.velocity[j], .acceleration = point.acceleration[j]};
+  }
+  return true;
+}
+
 bool MotionDirector::at(const Moment& now, Wanted& wanted) noexcept {
   wanted.arm = permit_.load(std::memory_order_relaxed) && now.plausible;
   wanted.mode = motion_.kind == Motion::Kind::kTorque ? control::Mode::kTorque : control::Mode::kPosition;
   if (now.phase !=
       Phase::kControl) {  // until the controller takes over, the joints are wanted where they are
     for (std::size_t j = 0; j < wanted.joint.size(); ++j) wanted.joint[j] = {.angle = now.angle[j]};
+    found_ = now.angle;
   }
   if (now.phase == Phase::kChecking) return true;
   wanted.arm = true;
   if (now.phase == Phase::kVented) return true;
+  if (motion_.kind == Motion::Kind::kLine)
+    return now.phase != Phase::kControl || follow_line(now.control_time, wanted);
   if (now.phase == Phase::kControl && now.control_time >= motion_.duration) return false;
   if (motion_.kind == Motion::Kind::kPoints) {
     if (now.phase == Phase::kControl) follow_points(now.control_time, wanted);

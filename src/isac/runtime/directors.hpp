@@ -5,6 +5,7 @@
 ///   sine   φ_d = amplitude sin(2π f t), with its speed and acceleration for the feed-forward
 ///   points φ_d straight between the rows of a CSV (angle, or phi1 … phi6), all checked before anything moves: within the
 ///          joints' limits, and no faster than their speed limit (seed 6.2 checks its trajectory likewise)
+///   line   the hand along straight pieces (line_path.hpp), after a smooth move of all joints to the start pose and a rest there
 ///   torque T_d constant; 0 is leading by hand (seed 6.3)
 /// The desired angle that the controller sees starts at the joint's own and runs to these no faster than its speed limit.
 ///
@@ -15,9 +16,11 @@
 #include <atomic>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "isac/runtime/control_loop.hpp"
+#include "isac/runtime/line_path.hpp"
 #include "isac/series/recording.hpp"
 
 namespace isac::runtime {
@@ -28,12 +31,14 @@ struct MotionPoint {
 };
 
 struct Motion {
-  enum class Kind { kStep, kSine, kPoints, kTorque } kind = Kind::kStep;
+  enum class Kind { kStep, kSine, kPoints, kLine, kTorque } kind = Kind::kStep;
   double size = 0;       ///< rad or N m: height, amplitude, torque
   double frequency = 0;  ///< Hz, of a sine
   double duration = 5;   ///< s under control
   int joint = 0;         ///< the others hold 0 (rad, N m)
   std::vector<MotionPoint> points;
+  std::shared_ptr<const LinePath> path;  ///< of a line; its `duration` is what follows the end of the path
+  double rest = 2;                       ///< s at the start pose
 };
 
 /// Rows of a CSV with `time` and `angle`, or `phi1` … of all joints. `limits` has one entry per joint.
@@ -50,10 +55,13 @@ class MotionDirector final : public Director {
  private:
   [[nodiscard]] JointAim aim(double time) const noexcept;
   void follow_points(double time, Wanted& wanted) noexcept;
+  /// False: the path and its end are over.
+  [[nodiscard]] bool follow_line(double time, Wanted& wanted) noexcept;
 
   Motion motion_;
   const std::atomic<bool>& permit_;
   std::size_t cursor_ = 0;
+  PerJoint<double> found_{};  ///< rad, where the controller found the joints
 };
 
 /// Wants what the recording of a run wanted, row by row (columns of run_log.hpp).
