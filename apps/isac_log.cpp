@@ -22,6 +22,7 @@
 #include "isac/runtime/progress.hpp"
 #include "isac/runtime/stop_signals.hpp"
 #include "log/answer.hpp"
+#include "log/arm_poses.hpp"
 
 namespace {
 
@@ -29,7 +30,7 @@ using namespace isac;
 
 /// The words of the call that need more than CLI11: quantities with units.
 struct Words {
-  std::string experiment, plan, card, rig, folder, json, pace = "virtual";
+  std::string experiment, plan, card, rig, arm, folder, json, side, pace = "virtual";
   std::string duration, hold, amplitude, speed, base;
   std::string delta_pressures, angles, heights, weights, supplies;
   std::string limit_pressure, limit_delta_pressure, limit_angle, limit_speed, limit_force;
@@ -225,6 +226,9 @@ class Console : public runtime::SessionObserver {
 };
 
 int log_sweeps(const Words& words, const Given& given) {
+  if (words.rig.empty())
+    throw Error(ErrorKind::kUsage, "rig_missing",
+                "--rig rig.toml is required for a joint (--arm for an arm); see --help");
   if (words.experiment.empty() && words.plan.empty()) {
     throw Error(ErrorKind::kUsage, "experiment_missing",
                 "experiment is required: name one, like constant-pressure, or a plan with --plan plan.toml; "
@@ -268,12 +272,17 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", ISAC_VERSION);
   Words words;
   CLI::Option* experiment = app.add_option("experiment", words.experiment, "What to record (see below)");
-  CLI::Option* plan = app.add_option("--plan", words.plan,
-                                     "plan.toml of isac-explain: record its runs instead of an experiment");
+  CLI::Option* plan =
+      app.add_option("--plan", words.plan,
+                     "plan.toml of isac-explain: record its runs instead of an experiment; with "
+                     "--arm poses.csv of isac-identify masses --plan");
   plan->excludes(experiment);
   app.add_option("--card", words.card,
                  "The card, e.g. sim: or replay:FILE (default: the rig file's, else sim:)");
-  app.add_option("--rig", words.rig, "The rig file, rig.toml")->required();
+  app.add_option("--rig", words.rig, "The rig file, rig.toml: required for a joint");
+  CLI::Option* arm = app.add_option(
+      "--arm", words.arm, "arm.toml: hold an arm in the poses of --plan (docs/how-to/identify-masses.md)");
+  arm->excludes(experiment);
   app.add_option("-o,--output", words.folder, "Folder for the recordings; made if missing")->required();
   CLI::Option* rate =
       app.add_option("--rate", words.rate, "Samples per second (default: the rig file's, else 500)");
@@ -305,6 +314,9 @@ int main(int argc, char** argv) {
          "--supply", words.supplies,
          "calibrate: levels of the supply (default: 0 to the pressure limit, e.g. \"0,2.5,5 kg/cm2\")")
       ->group("Excitation");
+  app.add_option("--side", words.side,
+                 "--arm: the stretch from which a pose is approached (default: \"6 deg\")")
+      ->group("Excitation");
   app.add_option("--hold", words.hold, "Of each valve step or pose, e.g. \"2 s\"")->group("Excitation");
 
   app.add_option("--limit-pressure", words.limit_pressure, "Of either muscle")
@@ -319,6 +331,18 @@ int main(int argc, char** argv) {
       ->group("Safety limits (default: the rig file's)");
   app.footer(experiments_help);
   return apps::run_program(app, argc, argv, words.json, [&] {
+    if (!words.arm.empty()) {
+      return apps::log_arm_poses({.arm = words.arm,
+                                  .plan = words.plan,
+                                  .card = words.card,
+                                  .folder = words.folder,
+                                  .json = words.json,
+                                  .limit_delta_pressure = words.limit_delta_pressure,
+                                  .limit_speed = words.limit_speed,
+                                  .side = words.side,
+                                  .rate = rate->count() > 0 ? words.rate : 200,
+                                  .overwrite = words.overwrite});
+    }
     return log_sweeps(words, {.rate = rate->count() > 0, .seed = seed->count() > 0});
   });
 }

@@ -9,11 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "common/dataset.hpp"
+#include "common/poses.hpp"
 #include "common/program.hpp"
 #include "common/quantity.hpp"
 #include "common/summary.hpp"
 #include "identify/commands.hpp"
-#include "identify/inputs.hpp"
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/mass_fit.hpp"
@@ -28,112 +29,17 @@ namespace isac::apps {
 namespace {
 
 constexpr int kMostPoses = 500;  // of a design; more is a mistake in the call
+constexpr double kMuscleShare =
+    0.9;  // of the limit of Δp that a planned pose may ask: the masses are not known yet
+constexpr double kSpareAngle =
+    9 * kPi / 180;  // rad, to the limits: isac-log approaches a pose from both sides
 
-struct Call {
-  std::vector<std::string> runs, maps, unknowns;
-  std::string arm, actuators, params, report, angles = "auto", torques = "auto", noise, criterion = "A";
+struct Call : PoseWords {
+  std::vector<std::string> unknowns;
+  std::string params, report, plan, criterion = "A", limit = "2 kg/cm2";
   int design = 8;
-  bool by_model = false, add = false, plain = false;
+  bool add = false, plain = false;
 };
-
-double error_of(double value) {
-  return std::isfinite(value) ? value : 0;
-}
-
-estimate::MassArm mass_arm(const record::ArmFile& file) {
-  estimate::MassArm arm;
-  arm.chain = file.chain;
-  arm.joints = file.joints;
-  arm.coupling = file.coupling;
-  arm.middle = file.middle;
-  arm.limits = file.limits;
-  arm.mass_names = file.mass_names;
-  for (const record::ArmActuator& a : file.actuators)
-    arm.actuators.push_back({a.A, a.B, a.wheel_radius, error_of(a.A_error), error_of(a.B_error)});
-  return arm;
-}
-
-/// A, B and their standard errors from params.toml: the sections [[joint]] labelled "1", "2" ….
-void take_actuators(const std::string& path, estimate::MassArm& arm) {
-  const record::Params params = record::read_params(path);
-  arm.actuators.resize(static_cast<std::size_t>(arm.joints));
-  for (std::size_t j = 0; j < arm.actuators.size(); ++j) {
-    const record::ParamsSection* section = params.find("joint", std::to_string(j + 1));
-    if (section == nullptr) {
-      throw Error(ErrorKind::kBadInput, "joint_missing",
-                  "has no [[joint]] with label = \"" + std::to_string(j + 1) +
-                      "\"; the actuators are told from there, one section per joint",
-                  {path, 0, 0});
-    }
-    estimate::MassActuator& actuator = arm.actuators[j];
-    for (const Estimated& value : section->values) {
-      const auto unit = parse_unit(value.unit);
-      if (!unit || !value.identifiable) continue;
-      if (value.name == "A") {
-        actuator.A = value.value * unit->scale;
-        actuator.A_error = error_of(value.std_error) * unit->scale;
-      } else if (value.name == "B") {
-        actuator.B = value.value * unit->scale;
-        actuator.B_error = error_of(value.std_error) * unit->scale;
-      }
-    }
-    for (const auto& [name, value] : section->constants)
-      if (name == "wheel_radius_m") actuator.wheel_radius = value;
-  }
-}
-
-bool has_any(const series::Recording& recording, const std::string& family) {
-  return std::any_of(recording.columns.begin(), recording.columns.end(), [&](const series::Column& column) {
-    return column.name.size() == family.size() + 1 && column.name.starts_with(family) &&
-           column.name.back() >= '1' && column.name.back() <= '6';
-  });
-}
-
-/// Column `family`1… of a row; a missing column is NaN where `required` is false, else an error that names it.
-void take(const series::Recording& recording, const std::string& family, int joints, std::size_t row,
-          bool required, estimate::ArmVector& out) {
-  for (int j = 0; j < joints; ++j) {
-    const std::string name = family + std::to_string(j + 1);
-    const series::Column* column = required ? &recording.column(name) : recording.find(name);
-    out[static_cast<std::size_t>(j)] = column != nullptr ? column->values[row] : std::nan("");
-  }
-}
-
-/// A column of plain numbers; counts and `1` are both fine.
-double plain(const series::Recording& recording, const std::string& name, std::size_t row, double fallback) {
-  const series::Column* column = recording.find(name);
-  return column != nullptr && std::isfinite(column->values[row]) ? column->values[row] : fallback;
-}
-
-bool uses_actuator_angles(const series::Recording& recording, const Call& call) {
-  if (call.angles == "auto") return !has_any(recording, "theta") && has_any(recording, "phi");
-  return call.angles == "phi";
-}
-
-void append_poses(const series::Recording& recording, const estimate::MassFitOptions& options, int joints,
-                  bool many_files, std::vector<estimate::MassPose>& poses) {
-  if (!options.from_pressures && !has_any(recording, "tau")) {
-    (void)recording.column("tau1");  // throws, and says what the file has
-  }
-  for (std::size_t i = 0; i < recording.rows(); ++i) {
-    estimate::MassPose pose;
-    pose.name =
-        (many_files ? short_name(recording.source) + " " : std::string()) + "row " + std::to_string(i + 1);
-    pose.torque.fill(std::nan(""));
-    pose.delta_pressure.fill(std::nan(""));
-    take(recording, options.actuator_angles ? "phi" : "theta", joints, i, true, pose.angle);
-    if (options.from_pressures) {
-      take(recording, "dp", joints, i, false, pose.delta_pressure);
-    } else {
-      take(recording, "tau", joints, i, false, pose.torque);
-    }
-    pose.load = plain(recording, "load", i, 1);
-    pose.target = std::lround(plain(recording, "pose", i, -1));
-    const double side = plain(recording, "approach", i, 0);
-    pose.approach = side > 0 ? 1 : side < 0 ? -1 : 0;
-    poses.push_back(std::move(pose));
-  }
-}
 
 nlohmann::ordered_json angles_json(const estimate::ArmVector& angles, int joints) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
@@ -147,12 +53,9 @@ nlohmann::ordered_json by_mass(const std::vector<std::string>& names, const std:
   return out;
 }
 
-nlohmann::ordered_json details_of(const estimate::MassFit& fit, const estimate::PoseDesign& design,
-                                  const estimate::PoseDesignOptions& options, const estimate::MassArm& arm) {
-  using nlohmann::ordered_json;
-  ordered_json extra;
-  extra["condition"] = json_number(fit.condition);
-  extra["next_poses"] = ordered_json::array();
+void add_design(nlohmann::ordered_json& extra, const estimate::PoseDesign& design,
+                const estimate::PoseDesignOptions& options, const estimate::MassArm& arm) {
+  extra["next_poses"] = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < design.theta.size(); ++i)
     extra["next_poses"].push_back({{"theta", angles_json(design.theta[i], arm.joints)},
                                    {"phi", angles_json(design.phi[i], arm.joints)},
@@ -164,6 +67,14 @@ nlohmann::ordered_json details_of(const estimate::MassFit& fit, const estimate::
                        {"with_recorded", by_mass(arm.mass_names, design.with_recorded)},
                        {"random_poses", by_mass(arm.mass_names, design.random_std_errors)}};
   }
+}
+
+nlohmann::ordered_json details_of(const estimate::MassFit& fit, const estimate::PoseDesign& design,
+                                  const estimate::PoseDesignOptions& options, const estimate::MassArm& arm) {
+  using nlohmann::ordered_json;
+  ordered_json extra;
+  extra["condition"] = json_number(fit.condition);
+  add_design(extra, design, options, arm);
   extra["torques"] = fit.sign == estimate::TorqueSign::kActuator ? "actuator" : "gravity";
   extra["torque_noise"] = {{"value", json_number(fit.torque_noise)},
                            {"unit", "N m"},
@@ -209,12 +120,8 @@ void print_design(const estimate::PoseDesign& design, const estimate::MassArm& a
   }
 }
 
-estimate::MassFitOptions fit_options(const Call& call, const record::ArmFile& file) {
-  estimate::MassFitOptions options;
-  options.torques_by_model = call.by_model;
+void take_unknowns(const Call& call, estimate::MassFitOptions& options) {
   options.robust = !call.plain;
-  if (call.torques == "gravity") options.sign = estimate::TorqueSign::kGravity;
-  if (call.torques == "actuator") options.sign = estimate::TorqueSign::kActuator;
   for (const std::string& unknown : call.unknowns) {
     if (unknown == "load") {
       options.load = true;
@@ -224,15 +131,6 @@ estimate::MassFitOptions fit_options(const Call& call, const record::ArmFile& fi
       options.zeros = true;
     }
   }
-  for (std::size_t j = 0; j < file.actuators.size(); ++j)
-    options.torque_noise[j] = file.actuators[j].torque_noise;
-  if (!call.noise.empty()) {
-    const double noise = parse_quantity(call.noise, dimension::kTorque, "--torque-noise");
-    if (!(noise > 0))
-      throw Error(ErrorKind::kUsage, "torque_noise", "--torque-noise must be greater than zero");
-    options.torque_noise.fill(noise);
-  }
-  return options;
 }
 
 estimate::PoseDesignOptions design_options(const Call& call, const estimate::MassFitOptions& fit) {
@@ -240,32 +138,70 @@ estimate::PoseDesignOptions design_options(const Call& call, const estimate::Mas
   options.poses = call.design;
   options.criterion = call.criterion == "D" ? estimate::DesignCriterion::kD : estimate::DesignCriterion::kA;
   options.add_to_recorded = call.add;
+  if (!call.plan.empty()) {  // poses that the arm's own muscles are to hold
+    options.delta_pressure_limit =
+        kMuscleShare * parse_quantity(call.limit, dimension::kPressure, "--limit-delta-pressure");
+    options.spare_angle = kSpareAngle;
+  }
   for (std::size_t j = 0; j < estimate::kArmJoints; ++j)
     if (std::isfinite(fit.torque_noise[j])) options.torque_noise[j] = fit.torque_noise[j];
   return options;
 }
 
-int run_masses(const Call& call, const std::string& json_path) {
-  for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
-  const record::ArmFile file = record::read_arm(call.arm);
-  estimate::MassArm arm = mass_arm(file);
-  if (!call.actuators.empty()) take_actuators(call.actuators, arm);
-  estimate::MassFitOptions options = fit_options(call, file);
-
-  const Files files = find_files(call.runs, {}, {});
-  const record::ReadOptions reading{
-      .map = parse_maps(call.maps), .require_time = false, .hash = !call.params.empty()};
-  const std::vector<series::Recording> recordings = read_all(files.runs, reading);
-  options.actuator_angles = uses_actuator_angles(recordings.front(), call);
-  options.from_pressures = !has_any(recordings.front(), "tau") && has_any(recordings.front(), "dp");
-  if (options.torques_by_model && !options.from_pressures && !options.actuator_angles) {
-    throw Error(ErrorKind::kUsage, "angles_wrong",
-                "--by-model needs the actuators' own angles and torques: record phi1… with tau1…, or dp1… "
-                "(pressure differences)");
+/// The proposed poses as a recording without torques: what isac-log --plan holds.
+void write_plan(const std::string& path, const estimate::PoseDesign& design, const record::ArmFile& file) {
+  if (design.theta.empty()) {
+    throw Error(
+        ErrorKind::kAnswerIsNo, "no_poses",
+        "no pose was found that the arm's muscles can hold inside its limits; check the actuators and "
+        "limits of the arm file");
   }
-  std::vector<estimate::MassPose> poses;
-  for (const series::Recording& recording : recordings)
-    append_poses(recording, options, arm.joints, recordings.size() > 1, poses);
+  series::Recording plan;
+  plan.metadata["experiment"] = "pose";
+  if (!file.name.empty()) plan.metadata["arm"] = file.name;
+  for (int j = 0; j < file.joints; ++j) {
+    series::Column column{"theta" + std::to_string(j + 1), "rad", {}};
+    for (const estimate::ArmVector& theta : design.theta)
+      column.values.push_back(theta[static_cast<std::size_t>(j)]);
+    plan.columns.push_back(std::move(column));
+  }
+  record::write_recording(path, plan);
+}
+
+/// Poses for an arm of which nothing is recorded yet.
+int run_design(const Call& call, const Poses& input, const std::string& json_path) {
+  const estimate::PoseDesignOptions next = design_options(call, input.options);
+  const estimate::PoseDesign design = estimate::design_poses(input.arm, next);
+  write_plan(call.plan, design, input.file);
+  if (!json_path.empty()) {
+    record::Answer answer;
+    answer.schema = "isac.masses/1";
+    nlohmann::ordered_json extra;
+    add_design(extra, design, next, input.arm);
+    write_text(json_path, record::format_answer(answer, extra));
+  }
+  if (json_path != "-") print_design(design, input.arm);
+  return 0;
+}
+
+int run_masses(const Call& call, const std::string& json_path) {
+  for (const std::string& path : {call.params, call.report, call.plan, json_path}) require_writable(path);
+  Poses input = read_poses(call, !call.params.empty());
+  const record::ArmFile& file = input.file;
+  const estimate::MassArm& arm = input.arm;
+  estimate::MassFitOptions& options = input.options;
+  take_unknowns(call, options);
+  if (call.runs.empty()) {
+    if (call.plan.empty() || call.design == 0) {
+      throw Error(
+          ErrorKind::kUsage, "poses_missing",
+          "poses are required: name a recording with a row per pose, or plan the first ones with --plan "
+          "poses.csv; see --help");
+    }
+    return run_design(call, input, json_path);
+  }
+  const std::vector<series::Recording>& recordings = input.recordings;
+  const std::vector<estimate::MassPose>& poses = input.poses;
 
   const estimate::MassFit fit = estimate::fit_masses(arm, poses, options);
   estimate::PoseDesignOptions next = design_options(call, options);
@@ -274,18 +210,19 @@ int run_masses(const Call& call, const std::string& json_path) {
   if (all_known) next.recorded = fit.information;
   estimate::PoseDesign design;
   if (call.design > 0) design = estimate::design_poses(arm, next);
+  if (!call.plan.empty()) write_plan(call.plan, design, file);
 
   std::vector<Estimated> parameters = fit.masses;
   parameters.insert(parameters.end(), fit.others.begin(), fit.others.end());
   if (!call.report.empty()) {
-    report::MassesReportInput input;
-    input.head.rig = file.name;
-    input.head.created = now_iso8601();
-    input.fit = &fit;
-    input.design = &design;
-    input.joints = arm.joints;
-    input.mass_names = arm.mass_names;
-    record::write_atomically(call.report, report::render_masses_report(input));
+    report::MassesReportInput report_input;
+    report_input.head.rig = file.name;
+    report_input.head.created = now_iso8601();
+    report_input.fit = &fit;
+    report_input.design = &design;
+    report_input.joints = arm.joints;
+    report_input.mass_names = arm.mass_names;
+    record::write_atomically(call.report, report::render_masses_report(report_input));
   }
   if (!call.params.empty()) {
     record::ParamsSection section;
@@ -326,8 +263,7 @@ Body add_masses(CLI::App& program, std::string& json_path) {
   auto call = std::make_shared<Call>();
   CLI::App* sub = program.add_subcommand("masses", "masses of an arm from poses, and the poses to hold next");
   sub->add_option("poses", call->runs,
-                  "recordings (CSV), a row per pose: theta1… or phi1…, and tau1… or dp1…")
-      ->required();
+                  "recordings (CSV), a row per pose: theta1… or phi1…, and tau1… or dp1…");
   sub->add_option("--arm", call->arm, "arm.toml: kinematics, masses' places, limits, actuators")->required();
   sub->add_option("--actuators", call->actuators,
                   "params.toml with [[joint]] \"1\", \"2\" …: A and B with their errors");
@@ -349,6 +285,11 @@ Body add_masses(CLI::App& program, std::string& json_path) {
   sub->add_option("--criterion", call->criterion, "A: smallest relative errors, D: smallest ellipsoid")
       ->check(CLI::IsMember({"A", "D"}))
       ->capture_default_str();
+  sub->add_option(
+      "--plan", call->plan,
+      "write the proposed poses (CSV) for isac-log --plan: only such as the muscles can hold; without "
+      "recordings the first ones");
+  sub->add_option("--limit-delta-pressure", call->limit, "of the muscles, for --plan")->capture_default_str();
   sub->add_flag("--add", call->add,
                 "propose what adds most to the recorded poses, instead of a set that stands alone");
   sub->add_option("--map", call->maps, "foreign column, e.g. theta2=\"Shoulder (deg)\":deg");

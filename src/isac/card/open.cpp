@@ -6,6 +6,7 @@
 #include "isac/card/card.hpp"
 #include "isac/card/comedi_card.hpp"
 #include "isac/card/replay_card.hpp"
+#include "isac/card/sim_arm.hpp"
 #include "isac/card/sim_card.hpp"
 #include "isac/card/sim_options.hpp"
 #include "isac/core/error.hpp"
@@ -23,7 +24,10 @@ struct BackEnd {
 
 constexpr std::array kBackEnds{
     BackEnd{"sim", "sim:OPTION=VALUE,...  the simulated testbed, in virtual time",
-            [](std::string_view rest) { return open_sim(std::make_shared<simulate::Rig>(parse_sim(rest))); }},
+            [](std::string_view rest) {
+              if (names_an_arm(rest)) return open_sim_arm(rest);
+              return open_sim(std::make_shared<simulate::Rig>(parse_sim(rest)));
+            }},
     BackEnd{"replay", "replay:FILE  a recording, row by row; writes are held against the recorded ones",
             [](std::string_view rest) {
               if (rest.empty()) {
@@ -63,7 +67,8 @@ Opened open(std::string_view name) {
 std::string open_help() {
   std::string help;
   for (const auto& back_end : kBackEnds) help += std::string(back_end.help) + "\n";
-  return help + "Options of sim:\n" + sim_help();
+  return help + "Options of sim:\n" + sim_help() + "Options of sim:arm=FILE,... (the simulated arm)\n" +
+         sim_arm_help();
 }
 
 }  // namespace isac::card

@@ -18,6 +18,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kRandomSets = 100;
 constexpr int kMostRounds = 20;
 constexpr int kMostSteps = 300;      // of NLopt for one pose
+constexpr double kTooMuch = 100;     // penalty of a pose that muscles cannot hold, per squared excess
+constexpr int kMostDraws = 1000;     // for a random pose that they can
 constexpr double kRoundGain = 1e-4;  // of the criterion's logarithm: errors to five parts in 100 000
 
 /// x_i of the Halton sequence in base `base`, in (0, 1).
@@ -35,6 +37,11 @@ class Designer {
   Designer(const MassArm& arm, const PoseDesignOptions& options)
       : arm_(arm), options_(options), masses_(arm.chain.mass_count) {
     felt_.fill(false);
+    for (std::size_t j = 0; j < kArmJoints; ++j) {
+      const double middle = (arm.limits.lower[j] + arm.limits.upper[j]) / 2;
+      lower_[j] = std::min(arm.limits.lower[j] + options.spare_angle, middle);
+      upper_[j] = std::max(arm.limits.upper[j] - options.spare_angle, middle);
+    }
     find_felt_joints();
   }
 
@@ -76,12 +83,26 @@ class Designer {
     return std::log(trace);
   }
 
+  /// How far the pose asks more than the limit of Δp, as a share of it; 0 where muscles hold it.
+  [[nodiscard]] double excess(const ArmVector& phi) const {
+    if (!(options_.delta_pressure_limit > 0)) return 0;
+    const ArmVector gravity = models::multiply_transposed<double, 6>(
+        arm_.coupling, models::gravity_torque(arm_.chain, theta_of(phi)));
+    double most = 0;
+    for (std::size_t j = 0; j < arm_.actuators.size(); ++j) {
+      const MassActuator& a = arm_.actuators[j];
+      const double r = a.wheel_radius;
+      const double delta = (-a.A * r * r * phi[j] - gravity[j]) / (a.B * r);
+      if (std::isfinite(delta)) most = std::max(most, std::abs(delta) / options_.delta_pressure_limit - 1);
+    }
+    return most;
+  }
   /// A pose from numbers in [0, 1): felt joints over their range, the others at rest.
   template <class Uniform>
   [[nodiscard]] ArmVector pose_from(Uniform uniform) const {
     ArmVector phi{};
     for (std::size_t j = 0; j < static_cast<std::size_t>(arm_.joints); ++j) {
-      const double low = arm_.limits.lower[j], high = arm_.limits.upper[j];
+      const double low = lower_[j], high = upper_[j];
       const double share = uniform(j);
       phi[j] = felt_[j] ? low + (high - low) * share : std::clamp(0.0, low, high);
     }
@@ -135,15 +156,19 @@ class Designer {
   const PoseDesignOptions& options_;
   int masses_;
   std::array<bool, kArmJoints> felt_{};
+  ArmVector lower_{}, upper_{};
 };
 
 std::vector<ArmVector> Designer::greedy(const Matrix& start) const {
   std::vector<ArmVector> candidates;
   std::vector<Matrix> shares;
   for (int i = 1; i <= options_.candidates; ++i) {
-    candidates.push_back(pose_from([i](std::size_t j) { return halton(i, kBases[j]); }));
+    const ArmVector phi = pose_from([i](std::size_t j) { return halton(i, kBases[j]); });
+    if (excess(phi) > 0) continue;
+    candidates.push_back(phi);
     shares.push_back(information(candidates.back()));
   }
+  if (candidates.empty()) return {};
   double largest = 0;
   for (const Matrix& share : shares) largest = std::max(largest, share.trace());
   // A touch of information in every direction, so that the first pose can be chosen before the sum can be inverted.
@@ -174,7 +199,8 @@ double cost_of(unsigned n, const double* x, double*, void* data) {
   const auto& problem = *static_cast<const PoseProblem*>(data);
   ArmVector phi{};
   std::copy_n(x, n, phi.begin());
-  const double value = problem.designer->criterion(problem.others + problem.designer->information(phi));
+  const double value = problem.designer->criterion(problem.others + problem.designer->information(phi)) +
+                       kTooMuch * std::pow(problem.designer->excess(phi), 2);
   return std::isfinite(value) ? value : 1e300;
 }
 
@@ -185,7 +211,7 @@ void Designer::refine(const Matrix& start, std::vector<ArmVector>& poses) const 
   for (int round = 0; round < kMostRounds; ++round) {
     for (ArmVector& phi : poses) {
       PoseProblem problem{this, sum - information(phi)};
-      ArmVector lower = arm_.limits.lower, upper = arm_.limits.upper, x = phi;
+      ArmVector lower = lower_, upper = upper_, x = phi;
       for (std::size_t j = 0; j < joints; ++j)
         if (!felt_[j]) lower[j] = upper[j] = x[j];
       nlopt_opt search = nlopt_create(NLOPT_LN_BOBYQA, joints);
@@ -200,7 +226,8 @@ void Designer::refine(const Matrix& start, std::vector<ArmVector>& poses) const 
       const nlopt_result result = nlopt_optimize(search, x.data(), &found);
       nlopt_destroy(search);
       // Roundoff stops leave the best point so far in x: what counts is whether it is better.
-      if ((result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && found < least) phi = x;
+      const bool better = (result > 0 || result == NLOPT_ROUNDOFF_LIMITED) && found < least;
+      if (better && excess(x) <= 1e-3) phi = x;
       sum = problem.others + information(phi);
     }
     sum = start + sum_of(poses);
@@ -215,9 +242,14 @@ std::vector<double> Designer::random_errors() const {
   std::vector<double> squares(static_cast<std::size_t>(masses_), 0);
   for (int set = 0; set < kRandomSets; ++set) {
     std::vector<ArmVector> poses;
-    for (int i = 0; i < options_.poses; ++i)
-      poses.push_back(
-          pose_from([&engine](std::size_t) { return static_cast<double>(engine() >> 11) * 0x1p-53; }));
+    for (int i = 0; i < options_.poses; ++i) {
+      ArmVector phi{};
+      int draws = 0;
+      do {
+        phi = pose_from([&engine](std::size_t) { return static_cast<double>(engine() >> 11) * 0x1p-53; });
+      } while (excess(phi) > 0 && ++draws < kMostDraws);
+      poses.push_back(phi);
+    }
     const auto errors = errors_of(sum_of(poses));
     for (std::size_t k = 0; k < squares.size(); ++k) squares[k] += errors[k] * errors[k] / kRandomSets;
   }

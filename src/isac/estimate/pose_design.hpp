@@ -12,6 +12,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "isac/estimate/mass_fit.hpp"
@@ -28,6 +29,9 @@ struct PoseDesignOptions {
   std::vector<double> recorded;  ///< information of poses already held (MassFit::information), or empty
   bool add_to_recorded = false;  ///< choose what adds most to them; else a set that stands alone
   int candidates = 4096;
+  /// Pa: only poses that muscles within ± this can hold, by the arm's actuators and masses; NaN: any.
+  double delta_pressure_limit = std::numeric_limits<double>::quiet_NaN();
+  double spare_angle = 0;  ///< rad, to every limit of φ: room to approach a pose from both sides
 };
 
 struct PoseDesign {

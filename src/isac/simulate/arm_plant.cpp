@@ -123,6 +123,8 @@ void check(const ArmPlantConfig& config) {
     if (!std::isfinite(q.A) || !std::isfinite(q.C) || !std::isfinite(q.D) || !(q.B > 0) ||
         !(j.wheel_radius > 0))
       refuse(name + " needs finite A, C, D, B above 0 and a wheel radius above 0.");
+    if (!std::isfinite(j.pull) || !std::isfinite(j.pull_stiffness))
+      refuse(name + " needs finite torques of what pulls on it.");
     if (!(j.inertia > 0) || !(j.friction >= 0) || !(j.friction_angle > 0) || !(j.play >= 0))
       refuse(name + " needs an inertia and a friction angle above 0, friction and play of 0 or more.");
     for (const ValveUnit& v : j.valve)
@@ -154,13 +156,13 @@ void ArmPlant::rest_at(const ArmVector& angle, double mean_pressure) noexcept {
       models::gravity_torque(config_.chain, models::multiply<double, 6>(config_.coupling, angle)));
   for (std::size_t i = 0; i < kArmJoints; ++i) {
     const ArmJointConfig& joint = config_.joints[i];
-    // The slack lies on the side to which gravity pulls the joint.
+    const double borne = gravity[i] + joint.pull - joint.pull_stiffness * angle[i];
+    // The slack lies on the side to which the joint is pulled.
     if (joint.play > 0)
-      x_.wheel_angle[i] -= models::sgn(gravity[i]) * joint.play + gravity[i] / config_.touch_stiffness;
+      x_.wheel_angle[i] -= models::sgn(borne) * joint.play + borne / config_.touch_stiffness;
     double delta = 0;
-    static_cast<void>(models::delta_pressure_for_torque<double>(joint.muscle, joint.wheel_radius, -gravity[i],
-                                                                joint.play > 0 ? x_.wheel_angle[i] : angle[i],
-                                                                0.0, delta));
+    static_cast<void>(models::delta_pressure_for_torque<double>(
+        joint.muscle, joint.wheel_radius, -borne, joint.play > 0 ? x_.wheel_angle[i] : angle[i], 0.0, delta));
     pressure_[i] = models::split_pressure(mean_pressure, delta);
     const std::array<double, 2> p = {pressure_[i].muscle_1, pressure_[i].muscle_2};
     std::array<double, 2> u{};
@@ -242,6 +244,7 @@ ArmPlant::State ArmPlant::rate(const State& x, const ArmVector& delta_pressure) 
     const bool slack = joint.play > 0;
     const double muscles = torque_of(i, x, delta_pressure[i]);
     mass[i][i] += joint.inertia;
+    torque[i] += joint.pull - joint.pull_stiffness * x.angle[i];
     if (slack) {
       const double touch = touch_torque(i, x);
       d.wheel_angle[i] = x.wheel_velocity[i];
@@ -321,6 +324,7 @@ ArmEnergy ArmPlant::energy() const noexcept {
       const double over = models::dead_zone(turn - x_.angle[i], joint.play);
       e.touch += 0.5 * config_.touch_stiffness * over * over;
     }
+    e.height += (0.5 * joint.pull_stiffness * x_.angle[i] - joint.pull) * x_.angle[i];
     e.muscles -= 0.5 * joint.muscle.A * r * r * turn * turn + joint.muscle.B * r * delta[i] * turn;
   }
   return e;

@@ -5,6 +5,7 @@
 ///   T_i = A r² φ_i + B r Δp_i − C φ̇_i³ − D φ̇_i − F_i z_i             pair of muscles, with Dahl friction      seed 3.10
 ///   (Kᵀ M(θ) K + diag I) φ̈ = T + Kᵀ (τ_g(θ) − h(θ, θ̇) + Jᵀ f)       θ = K φ (+ middle, in the chain)         seed 4.39 to 4.50
 ///   h = Σ m J_mᵀ J̇_m θ̇                                              Coriolis and centrifugal torques
+///   a hose that pulls on a joint adds  pull − pull_stiffness φ_i  to the right side
 ///   with slack: I φ̈_w = T(φ_w) − T_c, and T_c = k dz(φ_w − φ, ± play) + d (φ̇_w − φ̇) while in touch instead of T
 ///
 /// Point masses alone leave M singular: turning about the line from wrist to hand moves none of them. I is the joint's own
@@ -33,11 +34,13 @@ using ArmPressures = std::array<models::PressurePair<double>, kArmJoints>;
 
 struct ArmJointConfig {
   models::JointCoefficients<double> muscle;
-  double wheel_radius = 0;           ///< r, m
-  double inertia = 0.002;            ///< I, kg m², what turns with the wheel besides the arm's masses
-  double friction = 0;               ///< F, N m, Dahl (models/effects_memory.hpp, `hysteresis`)
-  double friction_angle = 2e-3;      ///< rad, turn within which the friction comes up
-  double play = 0;                   ///< rad, half of the slack between wheel and joint; 0: rigid
+  double wheel_radius = 0;       ///< r, m
+  double inertia = 0.002;        ///< I, kg m², what turns with the wheel besides the arm's masses
+  double friction = 0;           ///< F, N m, Dahl (models/effects_memory.hpp, `hysteresis`)
+  double friction_angle = 2e-3;  ///< rad, turn within which the friction comes up
+  double play = 0;               ///< rad, half of the slack between wheel and joint; 0: rigid
+  double pull = 0;            ///< N m, on the joint, of something that is no part of the arm: a hose, a cable
+  double pull_stiffness = 0;  ///< N m/rad, of the same: its torque is pull − pull_stiffness φ
   std::array<ValveUnit, 2> valve{};  ///< of muscle 1 and 2
 };
 
@@ -51,7 +54,7 @@ struct ArmPlantConfig {
   double step = 1e-4;            ///< s
 };
 
-/// Mechanical energy, J: of motion, of height, of the muscles (at the present Δp, as springs) and of the touching slack.
+/// Mechanical energy, J: of motion, of height (and of what pulls), of the muscles (at the present Δp, as springs) and of the touching slack.
 struct ArmEnergy {
   double kinetic = 0, height = 0, muscles = 0, touch = 0;
   [[nodiscard]] double sum() const noexcept { return kinetic + height + muscles + touch; }
@@ -68,6 +71,7 @@ class ArmPlant {
 
   /// Reference pressures from now on, Pa; they reach the valves after their dead times.
   void command(const ArmPressures& pressure) noexcept { commanded_ = pressure; }
+  [[nodiscard]] const ArmPressures& commanded() const noexcept { return commanded_; }
   /// Holds all joints where they are while valves go on; false lets go, from rest.
   void hold(bool held) noexcept;
   /// A force on the tool centre point, N, in the base frame, from now on.

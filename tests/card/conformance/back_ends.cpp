@@ -9,6 +9,7 @@
 #endif
 #include "isac/card/calibration.hpp"
 #include "isac/card/replay_card.hpp"
+#include "isac/card/sim_arm.hpp"
 #include "isac/card/sim_card.hpp"
 #include "isac/card/sim_options.hpp"
 
@@ -79,6 +80,20 @@ std::vector<BackEnd> back_ends() {
        [] {
          return open_simulated(
              "dead_time=0.03,effect=coulomb_friction:0.3,effect=hysteresis,drop=0.05,miscalibrated");
+       }},
+      {"sim_arm", false,
+       [] {
+         const card::SimArmConfig config =
+             card::parse_sim_arm("arm=" + std::string(ISAC_SOURCE_DIR) + "/data/arms/right_soft_arm.toml");
+         auto plant = std::make_shared<simulate::ArmPlant>(config.plant);
+         UnderTest test;
+         test.vented = [plant] {
+           for (const auto& muscles : plant->commanded())
+             if (muscles.muscle_1 != 0 || muscles.muscle_2 != 0) return false;
+           return true;
+         };
+         test.opened.card = std::make_unique<card::SimArmCard>(plant, config.encoder_zero);
+         return test;
        }},
       {"replay_of_codes", true, [] { return open_replayed(true); }},
       {"replay_of_physical_columns", true, [] { return open_replayed(false); }},
