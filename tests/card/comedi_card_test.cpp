@@ -1,4 +1,5 @@
 // The Comedi back end on boards that do what the kernel's drivers do: tables of data/cards, and every way a card fails.
+#include <comedi.h>
 #include <gtest/gtest.h>
 
 #include <string>
@@ -68,9 +69,43 @@ TEST_F(Comedi, present_day_pair_is_14_bit_and_its_counters_are_set_up) {
   const Opened opened = open(table("s626_pci1724"));
   EXPECT_EQ(opened.card->shape().input_max_code, 0x3fffu);
   EXPECT_EQ(opened.card->shape().output_max_code, 0x3fffu);
-  EXPECT_EQ(boards().at("/dev/comedi0").configurations, 6);
-  EXPECT_EQ(boards().at("/dev/comedi0").last_configuration, std::vector<std::uint32_t>{0});
+  EXPECT_EQ(boards().at("/dev/comedi0").configurations, 7);  // six counters, and the heartbeat's direction
+  EXPECT_EQ(boards().at("/dev/comedi0").last_configuration,
+            std::vector<std::uint32_t>{INSN_CONFIG_DIO_OUTPUT});
+  EXPECT_TRUE(opened.card->shape().heartbeat);
   EXPECT_TRUE(opened.remarks.empty());
+}
+
+TEST_F(Comedi, heartbeat_is_a_digital_line_that_a_second_handle_leaves_alone) {
+  card::SignalTable signals = table("testbed");
+  signals.lines.push_back({.kind = card::SignalLine::Kind::kHeartbeat,
+                           .signal = "heartbeat",
+                           .device = "/dev/comedi0",
+                           .driver = {},
+                           .subdevice = 3,
+                           .range_text = {}});
+  const std::uint32_t& line = controller().subdevices[3].value[0];
+  const Opened opened = open(signals);
+  EXPECT_TRUE(opened.card->shape().heartbeat);
+  EXPECT_EQ(opened.card->beat(true), Status::kOk);
+  EXPECT_EQ(line, 1u);
+  {
+    const Opened supervisors = open(signals);
+    EXPECT_EQ(line, 1u);
+    EXPECT_EQ(supervisors.card->vent(), Status::kOk);
+  }
+  EXPECT_EQ(line, 1u);  // it tells of the loop, not of the supervisor
+  EXPECT_EQ(opened.card->beat(false), Status::kOk);
+  EXPECT_EQ(line, 0u);
+  controller().fail_writes = true;
+  EXPECT_EQ(opened.card->beat(true), Status::kDeviceError);
+  controller().fail_writes = false;
+  signals.lines.back().subdevice = 1;
+  signals.lines.back().channel = 5;
+  EXPECT_EQ(refused(signals),
+            "table_misfit: heartbeat (/dev/comedi0, subdevice 1, channel 5): the subdevice is of another "
+            "kind than the "
+            "signal");
 }
 
 TEST_F(Comedi, one_call_reads_a_device_and_another_writes_one) {

@@ -38,7 +38,8 @@ FakeBoard controller_board() {
   return {.driver = "isac_rig",
           .subdevices = {{COMEDI_SUBD_AI, 4, 4095, {{0, 10, UNIT_volt}}, {}},
                          {COMEDI_SUBD_AO, 12, 4095, {{4, 20, UNIT_mA}}, {}},
-                         {COMEDI_SUBD_COUNTER, 6, 0xffffff, {{0, 1, UNIT_none}}, {}}},
+                         {COMEDI_SUBD_COUNTER, 6, 0xffffff, {{0, 1, UNIT_none}}, {}},
+                         {COMEDI_SUBD_DO, 1, 1, {{0, 5, UNIT_volt}}, {}}},
           .last_configuration = {}};
 }
 FakeBoard labpc_board() {

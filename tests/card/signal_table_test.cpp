@@ -76,6 +76,12 @@ TEST(SignalTable, refuses_what_cannot_be_wired) {
   EXPECT_EQ(refused(row("ai0", "range = \"0..10 V\"")), "outputs_missing");
   EXPECT_EQ(refused(kAo0), "inputs_missing");
   EXPECT_EQ(refused(row("enc0", "range = \"0..10 V\"") + kAo0), "value_out_of_place");
+  EXPECT_EQ(refused(row("enc0", "") + row("heartbeat", "", 1) + kAo0), "taken");
+  EXPECT_EQ(refused(row("enc0", "") + row("heartbeat", "range = \"0..5 V\"", 1) + kAo0),
+            "value_out_of_place");
+  EXPECT_EQ(refused(row("enc0", "") + row("heartbeat", "", 1) + row("heartbeat", "", 2) + kAo0),
+            "signal_gap");
+  EXPECT_EQ(refused(row("enc0", "") + row("heartbeat1", "", 1) + kAo0), "signal_unknown");
   EXPECT_EQ(refused(row("enc0", "setup = \"x2\"") + kAo0), "word_unknown");
   EXPECT_EQ(refused(row("ai0", "range = \"0..10 V\"\nsetup = \"preload\"") + kAo0), "value_out_of_place");
   EXPECT_EQ(refused(row("ai0", "range = \"0..10 V\"\nreference = \"air\"") + kAo0), "word_unknown");

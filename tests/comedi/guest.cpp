@@ -52,6 +52,12 @@ void set_fault(const char* name, int value) {
   std::ofstream("/sys/module/isac_rig/parameters/" + std::string(name)) << value;
 }
 
+int beats() {
+  int count = -1;
+  std::ifstream("/sys/module/isac_rig/parameters/beats") >> count;
+  return count;
+}
+
 /// The outputs as another program sees them.
 std::string outputs(const char* device) {
   comedi_t* handle = comedi_open(device);
@@ -80,6 +86,7 @@ std::string write_table(const char* name, const char* sensors) {
   for (int i = 0; i < 8; ++i) text += row("ai" + std::to_string(i), sensors, 0, i, "range = \"0..10 V\"");
   for (int i = 0; i < 2; ++i)
     text += row("ao" + std::to_string(i), "/dev/comedi0", 1, i, "range = \"4..20 mA\"");
+  text += row("heartbeat", "/dev/comedi0", 3, 0, "");
   const std::string path = std::string("/") + name + ".toml";
   std::ofstream(path) << text;
   return path;
@@ -156,7 +163,8 @@ ControlOutcome run(const Wish& wish) {
                 .size = 0.1,
                 .frequency = 1.0,
                 .duration = wish.seconds,
-                .points = {}};
+                .points = {},
+                .path = {}};
   run.log = "/" + wish.name + ".csv";
   run.flight = "/" + wish.name + ".flight.csv";
   run.beat.beat = wish.beat_limit;
@@ -166,8 +174,10 @@ ControlOutcome run(const Wish& wish) {
 }
 
 void loop_in_time(const std::string& table, const std::string& name, int joints, const char* angle_column) {
+  const int beats_before = beats();
   const ControlOutcome outcome =
       run({.table = table, .name = name, .seconds = 1.0, .act = {}, .joints = joints});
+  const auto edges = beats() - beats_before;
   check(outcome.as_planned() && outcome.loop.why == LoopEnd::Why::kDone,
         name + ": played to its end at 2 kHz");
   check(outcome.loop.late == 0,
@@ -180,12 +190,19 @@ void loop_in_time(const std::string& table, const std::string& name, int joints,
   for (const double angle : log.column(angle_column).values) most = std::max(most, std::abs(angle));
   check(most > 0.02, fmt::format("{}: the joint in the kernel moved to {:.3f} rad", name, most));
   check(outputs("/dev/comedi0") == "0,0", name + ": valves closed afterwards");
+  if (joints > 1) return;  // the arm's table has no heartbeat
+  // One edge a cycle; the last cycle and the end leave it low.
+  check(std::abs(edges - outcome.loop.cycles) <= 2,
+        fmt::format("{}: {} edges of the heartbeat in {} cycles", name, edges, outcome.loop.cycles));
 }
 
 void dies(const std::string& table, const std::string& name, const std::function<void()>& act,
           SupervisorEnd::Why why, std::int64_t beat_limit) {
   const ControlOutcome outcome = run({.table = table, .name = name, .act = act, .beat_limit = beat_limit});
   const std::string held = outputs("/dev/comedi0");
+  const int edges = beats();
+  ::usleep(20'000);
+  check(beats() == edges, name + ": the heartbeat stands still");
   check(!outcome.told && outcome.supervisor.why == why && held == "0,0",
         fmt::format("{}: valves closed {:.2f} ms after the last beat, outputs now {}", name,
                     1e-6 * static_cast<double>(outcome.supervisor.silent_ns), held));

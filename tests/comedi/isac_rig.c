@@ -7,6 +7,7 @@
  *   subdevice 0   8 inputs, 12 bit, 0..10 V: 0 and 2 the forces at rest, 4 and 6 the pressures of joint 0, with a lag
  *   subdevice 1   12 outputs, 12 bit, 4..20 mA: two valves a joint
  *   subdevice 2   6 counters, 24 bit: each joint follows the difference of its two valves, with a lag
+ *   subdevice 3   1 digital output: the heartbeat; the parameter `beats` counts its edges
  * Lags are whole-number filters per reading, so that a run under virtual time is the same every time.
  *
  * Faults, as module parameters that can be set while it runs (they act on readings of inputs; enc_jump on counters):
@@ -30,6 +31,8 @@ static int empty;
 module_param(empty, int, 0644);
 static int enc_jump;
 module_param(enc_jump, int, 0644);
+static int beats;
+module_param(beats, int, 0644);
 
 /* The one rig, whichever card looks at it. Fixed point: 256 to a count. */
 static int position[JOINTS];
@@ -104,10 +107,21 @@ static int rig_read_counter(struct comedi_device *dev, struct comedi_subdevice *
 	return insn->n;
 }
 
+static int rig_heartbeat(struct comedi_device *dev, struct comedi_subdevice *s, struct comedi_insn *insn,
+			 unsigned int *data)
+{
+	unsigned int before = s->state;
+
+	comedi_dio_update_state(s, data);
+	beats += s->state != before;
+	data[1] = s->state;
+	return insn->n;
+}
+
 static int rig_attach(struct comedi_device *dev, struct comedi_devconfig *it)
 {
 	struct comedi_subdevice *s;
-	int ret = comedi_alloc_subdevices(dev, 3);
+	int ret = comedi_alloc_subdevices(dev, 4);
 
 	if (ret)
 		return ret;
@@ -133,6 +147,13 @@ static int rig_attach(struct comedi_device *dev, struct comedi_devconfig *it)
 	s->maxdata = 0xffffff;
 	s->range_table = &range_unknown;
 	s->insn_read = rig_read_counter;
+	s = &dev->subdevices[3];
+	s->type = COMEDI_SUBD_DO;
+	s->subdev_flags = SDF_WRITABLE;
+	s->n_chan = 1;
+	s->maxdata = 1;
+	s->range_table = &range_digital;
+	s->insn_bits = rig_heartbeat;
 	return 0;
 }
 

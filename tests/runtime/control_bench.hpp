@@ -60,7 +60,8 @@ class TestDirector final : public runtime::Director {
 
 class Bench {
  public:
-  explicit Bench(const std::function<void(runtime::ControlSettings&)>& change = {}) {
+  explicit Bench(const std::function<void(runtime::ControlSettings&)>& change = {}, bool heartbeat = false) {
+    card.has_heartbeat = heartbeat;
     settings = runtime::testbed_control_settings(rig, {});
     settings.run_up = 0.01;
     if (change) change(settings);

@@ -162,8 +162,13 @@ TEST(ControlSetup, six_joints_run_in_one_loop_and_only_the_one_that_is_asked_mov
   runtime::ControlLoop loop(card, runtime::wire_joints({}, card.shape(), 6), settings);
   ASSERT_EQ(loop.configure(), Status::kOk);
   const std::atomic<bool> permit{true}, stop{false};
-  runtime::MotionDirector director(
-      {.kind = runtime::Motion::Kind::kStep, .size = 0.2, .duration = 3, .joint = 4, .points = {}}, permit);
+  runtime::MotionDirector director({.kind = runtime::Motion::Kind::kStep,
+                                    .size = 0.2,
+                                    .duration = 3,
+                                    .joint = 4,
+                                    .points = {},
+                                    .path = {}},
+                                   permit);
   std::array<double, 6> most{};
   struct Watch final : runtime::CycleSink {
     explicit Watch(std::array<double, 6>& m) : most(m) {}

@@ -16,7 +16,7 @@ namespace isac::test {
 class FakeCard : public card::Card {
  public:
   [[nodiscard]] card::Shape shape() const noexcept override {
-    return {.encoders = 1, .inputs = 8, .outputs = 2};
+    return {.encoders = 1, .inputs = 8, .outputs = 2, .heartbeat = has_heartbeat};
   }
 
   Status wait_until(std::int64_t time_ns) noexcept override {
@@ -49,6 +49,14 @@ class FakeCard : public card::Card {
     return Status::kOk;
   }
 
+  Status beat(bool level) noexcept override {
+    if (!has_heartbeat || fail_beat) return Status::kDeviceError;
+    if (level != beat_level) last_beat_ns = now_ns;
+    beats += level != beat_level ? 1 : 0;
+    beat_level = level;
+    return Status::kOk;
+  }
+
   Status vent() noexcept override {
     written = {};
     ++vents;
@@ -77,6 +85,9 @@ class FakeCard : public card::Card {
   long encoder = 0;
   std::uint32_t force_1 = force_code(90), force_2 = force_code(90);
   card::Command written;
+  bool has_heartbeat = false, fail_beat = false, beat_level = false;
+  int beats = 0;
+  std::int64_t last_beat_ns = -1;
   int waits = 0, writes = 0, vents = 0, fail_after = -1;
   Status failure = Status::kDeviceError;
 };

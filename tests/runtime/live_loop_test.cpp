@@ -270,6 +270,51 @@ TEST(ControlLoop, vents_in_the_cycle_in_which_a_write_fails) {
   EXPECT_TRUE(bench.card.closed());
 }
 
+TEST(ControlLoop, turns_its_heartbeat_over_in_every_cycle_and_leaves_it_low_after_a_fault) {
+  Bench bench({}, true);
+  bench.cycles(20);  // whoever guards the supply must see the loop before anything is armed
+  EXPECT_EQ(bench.card.beats, 20);
+  bench.run_in();
+  EXPECT_EQ(bench.card.beats, 220);
+  EXPECT_EQ(bench.card.last_beat_ns, bench.card.now_ns);
+  const std::int64_t last_good = bench.card.now_ns;
+  bench.card.change = [](card::Sample& sample) { sample.input[4] = 65535; };
+  bench.cycles(1);
+  EXPECT_EQ(bench.state(), RunState::kFaulted);
+  EXPECT_FALSE(bench.card.beat_level);
+  bench.cycles(100);
+  EXPECT_FALSE(bench.card.beat_level);
+  EXPECT_LE(bench.card.last_beat_ns, last_good + kPeriodNs);  // no edge later than the cycle of the fault
+}
+
+TEST(ControlLoop, heartbeat_stands_still_while_nobody_runs_the_loop_and_is_low_after_its_end) {
+  Bench bench({}, true);
+  bench.run_in();
+  const int beats = bench.card.beats;
+  static_cast<void>(
+      bench.card.wait_until(bench.card.now_ns + 100 * kPeriodNs));  // hung: nobody calls cycle()
+  EXPECT_EQ(bench.card.beats, beats);
+  bench.director.over = true;
+  const std::atomic<bool> stop{false};
+  EXPECT_EQ(bench.loop->run(bench.director, stop, nullptr, nullptr).why, runtime::LoopEnd::Why::kDone);
+  EXPECT_FALSE(bench.card.beat_level);
+  EXPECT_TRUE(bench.card.closed());
+}
+
+TEST(ControlLoop, heartbeat_that_cannot_be_written_vents_in_the_same_cycle) {
+  Bench bench({}, true);
+  bench.run_in();
+  bench.card.fail_beat = true;
+  bench.cycles(1);
+  EXPECT_EQ(bench.state(), RunState::kFaulted);
+  EXPECT_TRUE(bench.card.closed());
+  Bench deaf({}, true);  // and where it never could, nothing is armed
+  deaf.card.fail_beat = true;
+  deaf.cycles(1000);
+  EXPECT_EQ(deaf.state(), RunState::kDisarmed);
+  EXPECT_EQ(deaf.card.writes, 0);
+}
+
 TEST(ControlLoop, faults_on_a_sample_that_took_too_long_to_read) {
   Bench bench;
   bench.run_in();

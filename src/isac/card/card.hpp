@@ -32,6 +32,7 @@ struct Shape {
   std::uint32_t encoder_modulus = 1u << 24;   ///< counters wrap at this count
   std::uint32_t input_max_code = 4095;
   std::uint32_t output_max_code = 4095;
+  bool heartbeat = false;  ///< there is a line for beat()
 };
 
 struct Sample {
@@ -58,6 +59,12 @@ class Card {
   /// All valves to zero pressure; safe to call at any time, any number of times. A later write() opens them
   /// again.
   virtual Status vent() noexcept = 0;
+  /// The heartbeat line high or low: a relay beside the computer shuts the valves' supply when it stands still. Who beats is
+  /// the control loop; neither opening nor venting moves the line. kNotPermitted where there is none.
+  virtual Status beat(bool level) noexcept {
+    static_cast<void>(level);
+    return Status::kNotPermitted;
+  }
   /// What the outputs hold now; kNotPermitted where the card cannot tell.
   virtual Status outputs(Command& command) const noexcept {
     static_cast<void>(command);

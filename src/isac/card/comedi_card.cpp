@@ -139,6 +139,12 @@ class ComediCard final : public Card {
     return Status::kOk;
   }
 
+  Status beat(bool level) noexcept override {
+    if (!shape_.heartbeat) return Status::kNotPermitted;
+    beat_ = level ? 1 : 0;
+    return beats_.run() ? Status::kOk : Status::kDeviceError;
+  }
+
   Status outputs(Command& command) const noexcept override {
     for (std::size_t i = 0; i < held_.size(); ++i)
       command.output[i] = held_[i].load(std::memory_order_acquire);
@@ -150,8 +156,8 @@ class ComediCard final : public Card {
     std::vector<std::string>
         dead;  // a board that failed once is not asked again: each channel may take a second
     for (const SignalLine& line : table_.lines) {
-      if (line.kind == Kind::kOutput || std::find(dead.begin(), dead.end(), line.device) != dead.end())
-        continue;
+      const bool driven = line.kind == Kind::kOutput || line.kind == Kind::kHeartbeat;
+      if (driven || std::find(dead.begin(), dead.end(), line.device) != dead.end()) continue;
       lsampl_t code = 0;
       const int rc = comedi_data_read(device(line.device).handle, line.subdevice, line.channel,
                                       range_of(line), aref_of(line.reference), &code);
@@ -241,9 +247,29 @@ class ComediCard final : public Card {
     misfit(line, "the card has no range " + line.range_text + "; it has " + offered);
   }
 
+  /// A digital output of its own list: it tells of the loop, and no failed valve may keep it going.
+  void wire_heartbeat(const SignalLine& line, const Device& on) {
+    std::array<lsampl_t, 1> direction = {INSN_CONFIG_DIO_OUTPUT};
+    comedi_insn insn{};
+    insn.n = 1;
+    insn.subdev = line.subdevice;
+    insn.chanspec = CR_PACK(line.channel, 0, 0);
+    if (comedi_get_subdevice_type(on.handle, line.subdevice) == COMEDI_SUBD_DIO) {
+      insn.insn = INSN_CONFIG;
+      insn.data = direction.data();
+      if (comedi_do_insn(on.handle, &insn) < 0)
+        misfit(line, std::string("the line cannot be an output (") + comedi_strerror(comedi_errno()) + ")");
+    }
+    insn.insn = INSN_WRITE;
+    insn.data = &beat_;
+    beats_ = {.handle = on.handle, .instructions = {insn}};
+    shape_.heartbeat = true;
+  }
+
   void wire(const SignalLine& line) {
     Device& on = device(line.device);
     check_place(line, on);
+    if (line.kind == Kind::kHeartbeat) return wire_heartbeat(line, on);
     const std::uint32_t maxdata = comedi_get_maxdata(on.handle, line.subdevice, line.channel);
     if (maxdata == 0) misfit(line, "the driver does not say how wide the converter is");
     const unsigned range = range_of(line);
@@ -293,7 +319,9 @@ class ComediCard final : public Card {
     const int wanted = line.kind == Kind::kEncoder ? COMEDI_SUBD_COUNTER
                        : line.kind == Kind::kInput ? COMEDI_SUBD_AI
                                                    : COMEDI_SUBD_AO;
-    if (comedi_get_subdevice_type(on.handle, line.subdevice) != wanted)
+    const int found = comedi_get_subdevice_type(on.handle, line.subdevice);
+    const bool digital = found == COMEDI_SUBD_DIO || found == COMEDI_SUBD_DO;
+    if (line.kind == Kind::kHeartbeat ? !digital : found != wanted)
       misfit(line, "the subdevice is of another kind than the signal");
     if (static_cast<int>(line.channel) >= comedi_get_n_channels(on.handle, line.subdevice))
       misfit(line, "the subdevice has no such channel");
@@ -365,6 +393,8 @@ class ComediCard final : public Card {
   Shape shape_;
   std::vector<Device> devices_;
   std::vector<List> reads_, writes_, vents_;
+  List beats_;
+  lsampl_t beat_ = 0;
   std::array<lsampl_t, kEncoders> encoder_{};
   std::array<lsampl_t, kInputs> input_{};
   std::array<lsampl_t, kOutputs> output_{}, closed_{};  ///< driver's codes: of the next write, and of a vent

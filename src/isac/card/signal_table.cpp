@@ -72,6 +72,10 @@ class RowReader {
 
   void read_signal(SignalLine& line) const {
     line.signal = data_.text(row_, "signal");
+    if (line.signal == "heartbeat") {
+      line.kind = Kind::kHeartbeat;
+      return;
+    }
     for (const auto& kind : kKinds) {
       const std::string_view prefix = kind.prefix;
       if (!line.signal.starts_with(prefix)) continue;
@@ -81,8 +85,9 @@ class RowReader {
       line.kind = kind.kind;
       return;
     }
-    refuse("signal_unknown",
-           "'" + line.signal + "' is no signal of a card; write enc0 to enc5, ai0 to ai7 or ao0 to ao11");
+    refuse("signal_unknown", "'" + line.signal +
+                                 "' is no signal of a card; write enc0 to enc5, ai0 to ai7, ao0 to ao11 or "
+                                 "heartbeat");
   }
 
   [[nodiscard]] unsigned whole(const char* column, bool needed) const {
@@ -95,8 +100,8 @@ class RowReader {
 
   void read_range(SignalLine& line) const {
     line.range_text = data_.text(row_, "range");
-    if (line.kind == Kind::kEncoder) {
-      if (!line.range_text.empty()) refuse("value_out_of_place", "an encoder has no range");
+    if (line.kind == Kind::kEncoder || line.kind == Kind::kHeartbeat) {
+      if (!line.range_text.empty()) refuse("value_out_of_place", "an encoder and a heartbeat have no range");
       return;
     }
     const std::string& text = line.range_text;
@@ -142,7 +147,7 @@ SignalTable table_of(const record::DataTable& data) {
     throw Error(ErrorKind::kBadInput, code, text, {data.file, 0, 0});
   };
   std::set<std::tuple<std::string, unsigned, unsigned>> wires;
-  std::array<int, 3> next{};
+  std::array<int, 4> next{};
   for (const SignalLine& line : table.lines) {
     int& expected = next[static_cast<std::size_t>(line.kind)];
     if (line.index != expected)

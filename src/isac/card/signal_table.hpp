@@ -1,12 +1,12 @@
 /// @file
 /// Which signal of the card hangs on which Comedi channel: a table of rows (`isac.data/1`), one per wire.
 ///
-///   signal     enc0 … enc5, ai0 … ai7, ao0 … ao11; each kind without gaps from 0
+///   signal     enc0 … enc5, ai0 … ai7, ao0 … ao11; each kind without gaps from 0; heartbeat, on a digital output
 ///   device     "/dev/comedi0"; signals may be spread over several devices
 ///   driver     the driver that must be behind it ("s626"); checked where given
 ///   subdevice, channel   as the driver counts them
 ///   range      "0..10 V", "4..20 mA": looked up among the driver's ranges by its ends, so that nothing depends on an index;
-///              not for encoders
+///              not for encoders and the heartbeat
 ///   reference  ground (default), common, differential, other
 ///   vented     for ao: the driver's code at which the valve is closed, 0 where not given; code 0 of the card is that code
 ///   setup      for enc: "preload" (s626) or "quadrature x4" (NI) is sent before the first reading; else nothing
@@ -24,7 +24,7 @@
 namespace isac::card {
 
 struct SignalLine {
-  enum class Kind { kEncoder, kInput, kOutput } kind = Kind::kInput;
+  enum class Kind { kEncoder, kInput, kOutput, kHeartbeat } kind = Kind::kInput;
   int index = 0;
   std::string signal;  ///< "ai3"
   std::string device, driver;
@@ -39,7 +39,7 @@ struct SignalLine {
 
 struct SignalTable {
   std::string file, title;
-  std::vector<SignalLine> lines;  ///< encoders, inputs, outputs, each in order
+  std::vector<SignalLine> lines;  ///< encoders, inputs, outputs, each in order, then the heartbeat
   [[nodiscard]] int count(SignalLine::Kind kind) const noexcept;
 };
 

@@ -240,6 +240,16 @@ void ControlLoop::close_valves() noexcept {
   in_control_ = false;
 }
 
+void ControlLoop::beat() noexcept {
+  if (!wiring_.shape.heartbeat) return;
+  const bool alive = row_.answered && machine_.state() != control::RunState::kFaulted;
+  beat_ = alive && !beat_;
+  if (ok(card_.beat(beat_)) || !alive) return;
+  machine_.report(
+      {.code = FaultCode::kReadFailed});  // whoever guards the supply must not be left without a sign
+  close_valves();
+}
+
 void ControlLoop::show(Live* live) const noexcept {
   if (live == nullptr) return;
   live->time_ns.store(row_.time_ns, std::memory_order_relaxed);
@@ -289,6 +299,7 @@ bool ControlLoop::cycle(Director& director, Live* live, CycleSink* sink) noexcep
   if (more && !machine_.vents()) act(dt);
   if (more && !machine_.vents()) write_out();
   if (!more || machine_.vents()) close_valves();
+  beat();
   row_.state = machine_.state();
   row_.finding = machine_.state() == control::RunState::kFaulted ? machine_.cause() : found;
   ++end_.cycles;
@@ -321,6 +332,7 @@ LoopEnd ControlLoop::run(Director& director, const std::atomic<bool>& stop, Live
     }
   }
   close_valves();
+  if (wiring_.shape.heartbeat) static_cast<void>(card_.beat(false));
   end_.late = machine_.late_ticks();
   end_.skipped = machine_.skipped_periods();
   end_.ended_ns = row_.time_ns;

@@ -4,6 +4,7 @@
 /// One cycle, in this order (docs/derivations/loop.md; seed 6.2, figure 6.1):
 ///   wait → read → codes, limits, encoder, following error (control/watches) → fault machine → disarmed or faulted: vent
 ///   armed: pressures rise to p0 during `run_up`, then controller → rate limit, finite check, clamp → codes → write
+/// Where the card has a heartbeat line, each cycle without a fault turns it over, and its end, a fault or a dead loop leaves it.
 /// Everything but "armed" vents, in every cycle anew. dt is the difference of two samples' stamps. A cycle that comes late
 /// skips whole periods, counts them, and never catches up in a burst. A read or write that fails vents in the same cycle.
 ///
@@ -130,6 +131,7 @@ class ControlLoop {
   void control(double dt) noexcept;
   void write_out() noexcept;
   void close_valves() noexcept;
+  void beat() noexcept;
   void show(Live* live) const noexcept;
 
   card::Card& card_;
@@ -150,7 +152,7 @@ class ControlLoop {
   LoopEnd end_;
   std::int64_t next_ns_ = 0, first_ns_ = 0, last_ns_ = 0, armed_ns_ = 0, control_ns_ = 0;
   std::int64_t good_cycles_ = 0, bad_cycles_ = 0;
-  bool has_sample_ = false, in_control_ = false;
+  bool has_sample_ = false, in_control_ = false, beat_ = false;
   int failed_ = -1;
 };
 

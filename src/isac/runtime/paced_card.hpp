@@ -25,6 +25,7 @@ class PacedCard final : public card::Card {
   Status read(card::Sample& sample) noexcept override { return card_->read(sample); }
   Status write(const card::Command& command) noexcept override { return card_->write(command); }
   Status vent() noexcept override { return card_->vent(); }
+  Status beat(bool level) noexcept override { return card_->beat(level); }
   Status outputs(card::Command& command) const noexcept override { return card_->outputs(command); }
 
  private:

@@ -54,6 +54,7 @@ class SharedValves final : public card::Card {
     memory_.close();
     return card_->vent();
   }
+  Status beat(bool level) noexcept override { return card_->beat(level); }
   Status outputs(card::Command& command) const noexcept override { return card_->outputs(command); }
   [[nodiscard]] std::int64_t clock_ns() const noexcept override { return card_->clock_ns(); }
   [[nodiscard]] std::string diagnose() override { return card_->diagnose(); }

@@ -120,6 +120,16 @@ TEST_P(Conformance, write_beyond_the_range_is_refused_and_the_old_value_kept) {
   }
 }
 
+TEST_P(Conformance, heartbeat_moves_no_valve_and_is_refused_where_there_is_none) {
+  const Shape shape = card().shape();
+  Command command;
+  for (int i = 0; i < shape.outputs; ++i) command.output[i] = 100u * (i + 1);
+  ASSERT_EQ(card().write(command), Status::kOk);
+  for (const bool level : {true, false, true})
+    EXPECT_EQ(card().beat(level), shape.heartbeat ? Status::kOk : Status::kNotPermitted);
+  EXPECT_EQ(held().output, command.output);
+}
+
 TEST_P(Conformance, channels_beyond_the_shape_are_ignored) {
   const Shape shape = card().shape();
   if (shape.outputs == card::kOutputs) GTEST_SKIP() << "all channels are in use";
