@@ -183,38 +183,11 @@ class Fitter {
 };
 
 void Fitter::prepare(std::span<const MassPose> recorded) {
-  const MassArm& arm = problem_.arm;
-  std::vector<MassPose> rows;
-  std::string without;
-  for (const MassPose& pose : recorded) {
-    bool complete = true;
-    for (std::size_t j = 0; j < static_cast<std::size_t>(arm.joints); ++j)
-      complete = complete && std::isfinite(pose.angle[j]);
-    if (complete) {
-      rows.push_back(pose);
-    } else {
-      without += (without.empty() ? "" : ", ") + pose.name;
-    }
-  }
-  if (!without.empty())
-    fit_.warnings.push_back({"angle_missing", "Left out, because an angle is missing: " + without + "."});
-  if (options_.from_pressures) torques_from_pressures(problem_, rows);
-  problem_.poses = average_approaches(rows, noise_factor_, fit_.friction, fit_.warnings);
-  fit_.sign = options_.from_pressures ? TorqueSign::kActuator : options_.sign;
-  const bool find = fit_.sign == TorqueSign::kAuto;
-  if (find) fit_.sign = TorqueSign::kGravity;
-  fill_data(problem_, options_, noise_factor_, fit_.sign, told_);
-  if (problem_.data.empty()) {
-    throw Error(
-        ErrorKind::kAnswerIsNo, "no_usable_data",
-        "no pose has all its angles and at least one torque; record theta1… (or phi1…) with tau1… (or dp1…)");
-  }
-  if (find) {
-    for (std::size_t k = 0; k < arm.mass_names.size(); ++k)
-      problem_.unknowns.push_back({Kind::kMass, k, arm.mass_names[k], "kg"});
-    fit_.sign = find_sign(problem_);
-    fill_data(problem_, options_, noise_factor_, fit_.sign, told_);
-  }
+  MassReading reading = read_mass_poses(problem_, recorded, options_, told_);
+  noise_factor_ = std::move(reading.noise_factor);
+  fit_.sign = reading.sign;
+  fit_.friction = reading.friction;
+  fit_.warnings = std::move(reading.warnings);
   every_ = problem_.data;
   for (const MassPose& pose : problem_.poses) {
     MassPoseResult result;

@@ -3,6 +3,7 @@
 #include <map>
 #include <utility>
 
+#include "isac/core/error.hpp"
 #include "isac/estimate/mass_problem.hpp"
 
 namespace isac::estimate {
@@ -87,6 +88,44 @@ std::vector<MassPose> average_approaches(std::span<const MassPose> rows, std::ve
                         "Pose " + one_sided +
                             " was not approached from both sides, so friction is part of its torques; hold "
                             "it once from each side (column 'approach [1]', 1 and -1)."});
+  }
+  return out;
+}
+
+MassReading read_mass_poses(MassProblem& problem, std::span<const MassPose> recorded,
+                            const MassFitOptions& options, bool noise_known) {
+  MassReading out;
+  const MassArm& arm = problem.arm;
+  std::vector<MassPose> rows;
+  std::string without;
+  for (const MassPose& pose : recorded) {
+    bool complete = true;
+    for (std::size_t j = 0; j < static_cast<std::size_t>(arm.joints); ++j)
+      complete = complete && std::isfinite(pose.angle[j]);
+    if (complete) {
+      rows.push_back(pose);
+    } else {
+      without += (without.empty() ? "" : ", ") + pose.name;
+    }
+  }
+  if (!without.empty())
+    out.warnings.push_back({"angle_missing", "Left out, because an angle is missing: " + without + "."});
+  if (options.from_pressures) torques_from_pressures(problem, rows);
+  problem.poses = average_approaches(rows, out.noise_factor, out.friction, out.warnings);
+  out.sign = options.from_pressures ? TorqueSign::kActuator : options.sign;
+  const bool find = out.sign == TorqueSign::kAuto;
+  if (find) out.sign = TorqueSign::kGravity;
+  fill_data(problem, options, out.noise_factor, out.sign, noise_known);
+  if (problem.data.empty()) {
+    throw Error(
+        ErrorKind::kAnswerIsNo, "no_usable_data",
+        "no pose has all its angles and at least one torque; record theta1… (or phi1…) with tau1… (or dp1…)");
+  }
+  if (find) {
+    for (std::size_t k = 0; k < arm.mass_names.size(); ++k)
+      problem.unknowns.push_back({MassUnknown::Kind::kMass, k, arm.mass_names[k], "kg"});
+    out.sign = find_sign(problem);
+    fill_data(problem, options, out.noise_factor, out.sign, noise_known);
   }
   return out;
 }

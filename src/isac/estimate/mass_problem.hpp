@@ -71,6 +71,16 @@ struct MassSolution {
                                                        std::vector<double>& noise_factor, ArmVector& friction,
                                                        Warnings& warnings);
 
+/// The recorded rows as data of the problem: incomplete ones left out, sides averaged, torques as gravity's. Throws as fit_masses.
+struct MassReading {
+  std::vector<double> noise_factor;  ///< per pose of the problem
+  TorqueSign sign = TorqueSign::kGravity;
+  ArmVector friction{};
+  Warnings warnings;
+};
+[[nodiscard]] MassReading read_mass_poses(MassProblem& problem, std::span<const MassPose> recorded,
+                                          const MassFitOptions& options, bool noise_known);
+
 /// Where a solution stands: derivatives and residuals over the noise (prior rows last), and what they leave to check with.
 struct MassState {
   Eigen::MatrixXd jacobian;
