@@ -6,6 +6,7 @@
 
 #include "comedi_fake.hpp"
 #include "isac/core/error.hpp"
+#include "isac/record/data_tables.hpp"
 
 namespace isac::test {
 namespace {
@@ -74,6 +75,23 @@ TEST_F(Comedi, present_day_pair_is_14_bit_and_its_counters_are_set_up) {
             std::vector<std::uint32_t>{INSN_CONFIG_DIO_OUTPUT});
   EXPECT_TRUE(opened.card->shape().heartbeat);
   EXPECT_TRUE(opened.remarks.empty());
+}
+
+TEST_F(Comedi, every_gain_of_the_io_card_is_the_range_that_the_driver_has_for_it) {
+  // Table E.7: gains 1 to 100, unipolar. The driver numbers seven bipolar ranges before them.
+  const record::DataTable gains = record::read_data(std::string(ISAC_SOURCE_DIR) + "/data/io_card.toml");
+  ASSERT_EQ(gains.rows.size(), 7u);
+  for (std::size_t k = 0; k < gains.rows.size(); ++k) {
+    EXPECT_NEAR(gains.number(k, "range"), 10 / gains.number(k, "gain"), 1e-12);
+    card::SignalTable signals = table("testbed");
+    for (card::SignalLine& line : signals.lines) {
+      if (line.kind == card::SignalLine::Kind::kInput && line.index == 3)
+        line.range_high = gains.number(k, "range");
+    }
+    const Opened opened = open(signals);
+    EXPECT_EQ(opened.card->shape().input_max_code, 4095u);
+    EXPECT_EQ(labpc().range_read[signals.lines[4].channel], 7 + k) << gains.number(k, "gain");
+  }
 }
 
 TEST_F(Comedi, heartbeat_is_a_digital_line_that_a_second_handle_leaves_alone) {

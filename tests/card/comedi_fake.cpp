@@ -40,13 +40,31 @@ FakeBoard controller_board() {
                          {COMEDI_SUBD_AO, 12, 4095, {{4, 20, UNIT_mA}}, {}},
                          {COMEDI_SUBD_COUNTER, 6, 0xffffff, {{0, 1, UNIT_none}}, {}},
                          {COMEDI_SUBD_DO, 1, 1, {{0, 5, UNIT_volt}}, {}}},
-          .last_configuration = {}};
+          .last_configuration = {},
+          .range_read = {}};
 }
 FakeBoard labpc_board() {
   return {.driver = "ni_labpc",
-          .subdevices =
-              {{COMEDI_SUBD_AI, 8, 4095, {{-5, 5, UNIT_volt}, {0, 10, UNIT_volt}, {0, 5, UNIT_volt}}, {}}},
-          .last_configuration = {}};
+          .subdevices = {{COMEDI_SUBD_AI,
+                          8,
+                          4095,
+                          {{-5, 5, UNIT_volt},
+                           {-2.5, 2.5, UNIT_volt},
+                           {-1, 1, UNIT_volt},
+                           {-0.5, 0.5, UNIT_volt},
+                           {-0.25, 0.25, UNIT_volt},
+                           {-0.1, 0.1, UNIT_volt},
+                           {-0.05, 0.05, UNIT_volt},
+                           {0, 10, UNIT_volt},
+                           {0, 5, UNIT_volt},
+                           {0, 2, UNIT_volt},
+                           {0, 1, UNIT_volt},
+                           {0, 0.5, UNIT_volt},
+                           {0, 0.2, UNIT_volt},
+                           {0, 0.1, UNIT_volt}},
+                          {}}},
+          .last_configuration = {},
+          .range_read = {}};
 }
 FakeBoard s626_board() {
   const FakeSubdevice none{COMEDI_SUBD_DIO, 16, 1, {{0, 5, UNIT_volt}}, {}};
@@ -57,13 +75,15 @@ FakeBoard s626_board() {
                          none,
                          none,
                          {COMEDI_SUBD_COUNTER, 6, 0xffffff, {{0, 1, UNIT_none}}, {}}},
-          .last_configuration = {}};
+          .last_configuration = {},
+          .range_read = {}};
 }
 FakeBoard pci1724_board() {
   return {.driver = "adv_pci1724",
           .subdevices =
               {{COMEDI_SUBD_AO, 32, 0x3fff, {{-10, 10, UNIT_volt}, {0, 20, UNIT_mA}, {4, 20, UNIT_mA}}, {}}},
-          .last_configuration = {}};
+          .last_configuration = {},
+          .range_read = {}};
 }
 
 }  // namespace isac::test
@@ -103,6 +123,7 @@ int run(comedi_t* it, comedi_insn* insn) {
   if (static_cast<int>(insn->subdev) == board.fail_subdevice &&
       static_cast<int>(channel) == board.fail_channel)
     return isac::test::fail(board.fail_errno);
+  board.range_read[channel] = CR_RANGE(insn->chanspec);
   insn->data[0] = board.empty_slot ? 65535 : value;
   return 1;
 }

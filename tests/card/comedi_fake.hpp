@@ -37,6 +37,7 @@ struct FakeBoard {
   bool fail_writes = false, empty_slot = false;
   int lists = 0, instructions = 0, configurations = 0, open_handles = 0;
   std::vector<std::uint32_t> last_configuration;
+  std::map<unsigned, unsigned> range_read;  ///< of a channel, with its last reading
   [[nodiscard]] bool closed(int subdevice, std::uint32_t code = 0) const {
     for (const std::uint32_t value : subdevices[static_cast<std::size_t>(subdevice)].value)
       if (value != code) return false;

@@ -37,7 +37,7 @@ struct Motion {
   double duration = 5;   ///< s under control
   int joint = 0;         ///< the others hold 0 (rad, N m)
   std::vector<MotionPoint> points;
-  std::shared_ptr<const LinePath> path;  ///< of a line; its `duration` is what follows the end of the path
+  std::shared_ptr<const LinePath> path{};  ///< of a line; its `duration` is what follows the end of the path
   double rest = 2;                       ///< s at the start pose
 };
 
