@@ -63,6 +63,11 @@ class FakeCard : public card::Card {
     return Status::kOk;
   }
 
+  Status outputs(card::Command& command) const noexcept override {
+    command = written;
+    return Status::kOk;
+  }
+
   static record::RigChannel calibrated(const char* signal) {
     for (const record::RigChannel& channel : card::default_calibration()) {
       if (channel.signal == signal) return channel;
