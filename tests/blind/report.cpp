@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 
+#include "numbers.hpp"
 #include "score.hpp"
 
 namespace blind {
@@ -13,24 +13,6 @@ struct Scored {
   Judgement j;
 };
 using Group = std::vector<Scored>;
-
-std::string fixed(double x, int digits) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*f", digits, x);
-  return text;
-}
-
-/// "47/50 = 94 % (84 to 98)": the Wilson interval of 95 %.
-std::string share(double hits, double count) {
-  if (count == 0.0) return "–";
-  constexpr double z = 1.96;
-  const double p = hits / count, wide = 1.0 + z * z / count;
-  const double middle = (p + z * z / (2.0 * count)) / wide;
-  const double half = z / wide * std::sqrt(p * (1.0 - p) / count + z * z / (4.0 * count * count));
-  return fixed(hits, 0) + "/" + fixed(count, 0) + " = " + fixed(100.0 * p, 1) + " % (" +
-         fixed(100.0 * std::max(0.0, middle - half), 1) + " to " +
-         fixed(100.0 * std::min(1.0, middle + half), 1) + ")";
-}
 
 template <typename Predicate>
 std::string share_of(const Group& group, Predicate&& yes) {
@@ -43,15 +25,6 @@ Group only(const Group& group, Predicate&& yes) {
   Group out;
   std::copy_if(group.begin(), group.end(), std::back_inserter(out), yes);
   return out;
-}
-
-double quantile(std::vector<double> x, double q) {
-  if (x.empty()) return NAN;
-  std::sort(x.begin(), x.end());
-  const double at = q * static_cast<double>(x.size() - 1);
-  const auto i = static_cast<std::size_t>(at);
-  const double next = x[std::min(i + 1, x.size() - 1)];
-  return x[i] + (at - static_cast<double>(i)) * (next - x[i]);
 }
 
 std::string strength(const Truth& t) {
@@ -249,7 +222,7 @@ std::string report(const std::vector<Case>& cases) {
           others(of_kind("pair"), of_kind("unknown"));
   text += gaps(only(
       asked, [](const Scored& s) { return s.one->truth.kind == "single" || s.one->truth.kind == "pair"; }));
-  text += reliability(asked) + confusion(asked);
+  text += methods_table(cases) + reliability(asked) + confusion(asked);
   if (!untestable.empty()) {
     text += "Not testable at the strength asked for, so left out (some or all datasets):";
     for (const std::string& id : untestable) text += " " + id;

@@ -29,14 +29,15 @@ namespace {
 constexpr const char* kUsage =
     "blind_run --results FILE --explain PROGRAM [--tier NAMES] [--noise KINDS] [--effect IDS] [--count N] "
     "[--seed N]\n"
-    "          [--jobs N] [--timeout S] [--oracle] [-- WORDS FOR PROGRAM]\n"
+    "          [--jobs N] [--timeout S] [--oracle] [--baselines PROGRAM] [-- WORDS FOR PROGRAM]\n"
     "  NAMES of none, strong, clear, faint, pair, unknown (comma between; default all); KINDS as in "
     "blind_generate\n"
     "  --count: datasets per kind of noise, for single and unknown effects also per effect (default 1)\n"
+    "  --baselines: blind_baselines, asked about the same datasets; without --explain it is asked alone\n"
     "  among WORDS, {ids} stands for what is hidden, for a test that takes the truth out of the catalogue\n";
 
 struct Plan {
-  std::filesystem::path results, program, recordings;
+  std::filesystem::path results, program, baselines, recordings;
   std::vector<std::string> tiers = {"none", "strong", "clear", "faint", "pair", "unknown"};
   std::vector<std::string> noises = {"white", "coloured", "quantised", "real"};
   std::vector<std::string> only, words;
@@ -79,6 +80,8 @@ Plan read_plan(int count, char** list) {
       plan.results = value;
     else if (word == "--explain")
       plan.program = value;
+    else if (word == "--baselines")
+      plan.baselines = value;
     else if (word == "--tier")
       plan.tiers = split(value);
     else if (word == "--noise")
@@ -96,8 +99,8 @@ Plan read_plan(int count, char** list) {
     else
       throw std::invalid_argument("unknown word '" + word + "'");
   }
-  if (plan.results.empty() || plan.program.empty())
-    throw std::invalid_argument("--results and --explain are needed");
+  if (plan.results.empty() || (plan.program.empty() && plan.baselines.empty()))
+    throw std::invalid_argument("--results and --explain (or --baselines) are needed");
   if (const char* folder = std::getenv("ISAC_REAL_DATA")) plan.recordings = folder;
   return plan;
 }
@@ -251,7 +254,7 @@ std::string line_of(const Plan& plan, const Task& task) {
   const bool testable = dataset.not_testable.empty();
   blind::Gap noise;
   std::optional<blind::Verdict> verdict;
-  std::optional<Outcome> outcome;
+  std::optional<Outcome> outcome, baselines;
   if (testable) {
     noise = blind::heldout_noise(dataset, blind::write_dataset(dataset, scratch.path / "dataset"));
     if (plan.oracle && !dataset.hidings.empty()) verdict = blind::judge(dataset);
@@ -263,7 +266,10 @@ std::string line_of(const Plan& plan, const Task& task) {
       if (const std::size_t at = word.find("{ids}"); at != std::string::npos) word.replace(at, 5, ids);
       words.push_back(std::move(word));
     }
-    outcome = run_program(std::move(words), scratch.path, plan.timeout);
+    if (!plan.program.empty()) outcome = run_program(std::move(words), scratch.path, plan.timeout);
+    if (!plan.baselines.empty())
+      baselines = run_program({plan.baselines.string(), (scratch.path / "dataset").string()}, scratch.path,
+                              plan.timeout);
   }
   std::string label = blind::label_of(dataset, noise, verdict ? &*verdict : nullptr);
   label.pop_back();  // its line end
@@ -272,6 +278,10 @@ std::string line_of(const Plan& plan, const Task& task) {
   if (outcome) {
     json.field("exit", static_cast<double>(outcome->exit_code)).field("seconds", outcome->seconds);
     json.field("answer", outcome->out).field("error", outcome->err.substr(0, 500));
+  }
+  if (baselines && baselines->exit_code == 0) {
+    while (!baselines->out.empty() && baselines->out.back() == '\n') baselines->out.pop_back();
+    json.key("baselines").raw(baselines->out);
   }
   return json.close('}').text() + "\n";
 }

@@ -121,6 +121,11 @@ Case read_case(const std::string& line) {
   } else {
     one.answer.failed = "not asked";
   }
+  if (j.contains("baselines") && j["baselines"].is_object())
+    for (const auto& [method, answer] : j["baselines"].items()) {
+      one.baselines[method] = read_answer(answer.dump());
+      one.baselines[method].seconds = number(answer, "seconds");
+    }
   return one;
 }
 

@@ -36,6 +36,7 @@ struct Answer {
 struct Case {
   Truth truth;
   Answer answer;
+  std::map<std::string, Answer> baselines = {};  ///< by the method's name, of the same dataset
 };
 
 /// One line of a results file of blind_run. Throws std::runtime_error on a line that is none.
@@ -54,6 +55,9 @@ struct Judgement {
 };
 
 Judgement judge_case(const Case& one);
+
+/// Every baseline beside the answer, on the datasets that both were given: a table as Markdown, empty where there is none.
+std::string methods_table(const std::vector<Case>& cases);
 
 /// All tables, as Markdown.
 std::string report(const std::vector<Case>& cases);

@@ -138,5 +138,31 @@ TEST(Score, counts_false_alarms_by_kind_of_noise) {
   EXPECT_NE(report(cases).find("| coloured | 3/4 = 75.0 %"), std::string::npos) << report(cases);
 }
 
+TEST(Score, puts_every_baseline_beside_the_answer_on_the_same_dataset) {
+  Case one = single("creep");
+  one.answer = named({"creep"});
+  one.baselines["B1"] = named({"hysteresis", "creep"});
+  Case none = single("creep");
+  none.truth.kind = "none";
+  none.truth.ids = {};
+  none.answer.verdict = "none";
+  none.baselines["B1"] = named({"creep"});
+  const std::string table = methods_table({one, none});
+  // Columns: quiet, detected, first, in the set, names, wrong.
+  EXPECT_NE(
+      table.find("| isac-explain | 1/1 = 100.0 % (20.7 to 100.0) | 1/1 = 100.0 % (20.7 to 100.0) | 1/1"),
+      std::string::npos)
+      << table;
+  EXPECT_NE(
+      table.find(
+          "| B1 | 0/1 = 0.0 % (0.0 to 79.3) | 1/1 = 100.0 % (20.7 to 100.0) | 0/1 = 0.0 % (0.0 to 79.3) | "
+          "1/1 = 100.0 % (20.7 to 100.0) | 2.0 | 1/1"),
+      std::string::npos)
+      << table;
+  one.baselines.clear();
+  none.baselines.clear();
+  EXPECT_TRUE(methods_table({one, none}).empty());
+}
+
 }  // namespace
 }  // namespace blind
