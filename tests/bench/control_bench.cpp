@@ -1,7 +1,9 @@
 // What one control tick costs on this machine: the six-joint step in double and in float, its parts, and the firmware's tick.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -126,6 +128,58 @@ void one_joint(benchmark::State& state) {
   }
 }
 
+/// What gravity asks of the six joints, through the coupling.
+template <class S>
+void gravity_of_six_joints(benchmark::State& state) {
+  const auto arm = arm_of_table<S>();
+  const auto ticks = motion<S>();
+  LinkTwists<S, 6> twists;
+  std::size_t k = 0;
+  for (auto _ : state) {
+    isac::models::JointVector<S, 6> angle;
+    for (std::size_t i = 0; i < kJoints; ++i) angle[i] = ticks[k].now[i].angle;
+    benchmark::DoNotOptimize(
+        compensation_torque<S, 6>(arm->chain, arm->coupling, angle, {}, InertiaShare::kNone, twists));
+    k = k + 1 == ticks.size() ? 0 : k + 1;
+  }
+}
+
+/// Every step by itself on the clock: how far the slow ones lie from the median. The clock's own reading is measured the same way.
+template <class S>
+void spread_of_six_joints(benchmark::State& state) {
+  using Clock = std::chrono::steady_clock;
+  const auto arm = arm_of_table<S>();
+  const auto ticks = motion<S>();
+  std::array<JointCommand<S>, kJoints> command{};
+  int failed = -1;
+  std::vector<double> took, clock;
+  took.reserve(200'000);
+  clock.reserve(200'000);
+  for (auto _ : state) {
+    took.clear();
+    clock.clear();
+    for (std::size_t n = 0; n < 200'000; ++n) {
+      const auto& tick = ticks[n % ticks.size()];
+      const auto begin = Clock::now();
+      need(arm->step(tick.now, tick.wanted, S(5e-4), command, failed));
+      benchmark::DoNotOptimize(command);
+      const auto end = Clock::now();
+      const auto again = Clock::now();
+      took.push_back(static_cast<double>((end - begin).count()));
+      clock.push_back(static_cast<double>((again - end).count()));
+    }
+  }
+  const auto share = [](std::vector<double>& values, double part) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size()));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  state.counters["p50_ns"] = share(took, 0.5);
+  state.counters["p99_ns"] = share(took, 0.99);
+  state.counters["p99.9_ns"] = share(took, 0.999);
+  state.counters["clock_ns"] = share(clock, 0.5);
+}
+
 /// With encoders, watches and fault machine, in float, as on the microcontroller but with this machine's libm.
 void whole_tick_of_the_firmware(benchmark::State& state) {
   using namespace isac::embedded;
@@ -155,6 +209,10 @@ BENCHMARK(six_joints_without_compensation<double>);
 BENCHMARK(six_joints_without_compensation<float>);
 BENCHMARK(six_joints_with_dead_time_predictor<double>);
 BENCHMARK(six_joints_with_dead_time_predictor<float>);
+BENCHMARK(gravity_of_six_joints<double>);
+BENCHMARK(gravity_of_six_joints<float>);
+BENCHMARK(spread_of_six_joints<double>)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(spread_of_six_joints<float>)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(one_joint<double>);
 BENCHMARK(one_joint<float>);
 BENCHMARK(whole_tick_of_the_firmware);
