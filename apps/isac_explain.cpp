@@ -9,6 +9,7 @@
 #include "common/program.hpp"
 #include "explain/additions.hpp"
 #include "explain/answer.hpp"
+#include "explain/arm_poses.hpp"
 #include "explain/inputs.hpp"
 #include "explain/plan.hpp"
 #include "explain/summary.hpp"
@@ -113,6 +114,13 @@ int main(int argc, char** argv) {
   app.add_option("--seed", words.seed, "Seed of every random draw; the same seed gives the same answer")
       ->capture_default_str();
   app.add_flag("--verbose", words.verbose, "Say on standard error what is tried and ruled out, line by line");
+  apps::ArmExplainWords arm;
+  apps::add_arm_options(app, arm);
   app.footer("Exit codes: 0 done, 1 no usable data, 2 wrong call, 3 bad file.");
-  return apps::run_program(app, argc, argv, words.json, [&] { return run(words); });
+  return apps::run_program(app, argc, argv, words.json, [&] {
+    if (arm.arm.empty()) return run(words);
+    arm.runs = words.dataset;
+    arm.maps = words.maps;
+    return apps::explain_arm(arm, words.json, words.report);
+  });
 }

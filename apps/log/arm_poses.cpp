@@ -30,6 +30,9 @@ class Console final : public runtime::PoseObserver {
     if (pose.distance > kFar)
       fmt::print(out_, ", joint {} stays {:.1f} deg from the plan", pose.farthest + 1,
                  pose.distance * 180 / kPi);
+    if (pose.saturated >= 0)
+      fmt::print(out_, "; joint {}'s muscles are at the limit of their pressure: left out",
+                 pose.saturated + 1);
     fmt::print(out_, "\n");
     std::fflush(out_);
   }
@@ -112,7 +115,7 @@ int log_arm_poses(const ArmPoseWords& words) {
   const runtime::PoseSessionResult result =
       runtime::hold_poses(options, console, runtime::StopSignals::requested());
   bool keep = result.complete;
-  for (const runtime::HeldPose& pose : result.rows) keep = keep && pose.at_rest;
+  for (const runtime::HeldPose& pose : result.rows) keep = keep && pose.at_rest && pose.saturated < 0;
   fmt::print(out, "{} rows of {} poses in {}\n", result.rows.size(), options.theta.size(),
              options.file.string());
   if (!words.json.empty()) write_text(words.json, format_poses(result, options.file.string(), keep));

@@ -71,6 +71,57 @@ TEST(ArmPoses, plan_hold_identify_gives_the_masses_within_their_intervals) {
   EXPECT_NEAR(answer["friction"][4].get<double>(), 0.021, 0.003);
 }
 
+/// Five poses far apart, by hand: elbow and wrist turned to either side.
+std::string plan_by_hand(const ScratchFolder& folder) {
+  std::ofstream(folder / "hand.csv")
+      << "theta1 [deg],theta2 [deg],theta3 [deg],theta4 [deg],theta5 [deg],theta6 [deg]\n"
+         "0,40,30,15,0,50\n0,-5,-45,0,45,0\n20,65,-10,10,-50,0\n-20,-60,30,10,45,0\n"
+         "0,10,-15,-15,-20,-25\n";
+  return folder / "hand.csv";
+}
+
+json explained(const ScratchFolder& folder, const std::string& arm, const std::string& card,
+               bool report = false) {
+  const test::Run logged = run_program({"isac-log", "--arm", kArm, "--plan", plan_by_hand(folder), "--card",
+                                        card, "-o", folder / "run", "--overwrite"});
+  EXPECT_EQ(logged.exit_code, 0) << logged.err;
+  std::vector<std::string> call = {"isac-explain", folder / "run/poses.csv", "--arm", arm, "--json", "-"};
+  if (report) call.insert(call.end(), {"--report", folder / "hidden.html"});
+  return answer_of(run_program(call), 0);
+}
+
+TEST(ArmPoses, explain_names_what_is_hidden_in_the_simulated_arm) {
+  const ScratchFolder folder;
+  EXPECT_EQ(explained(folder, kArm, "sim:friction=0.01")["verdict"], "none");
+
+  const json load = explained(folder, kArm, "sim:friction=0.01,load=0.05", true);
+  EXPECT_EQ(load["verdict"], "named");
+  EXPECT_EQ(load["effects"][0]["id"], "hand_load");
+  EXPECT_NEAR(load["effects"][0]["parameters"]["load"]["value"].get<double>(), 0.05, 0.001);
+  EXPECT_EQ(load["lookalikes"], json::array({"m3"}));
+  EXPECT_NE(read_text(folder / "hidden.html").find("a load in the hand"), std::string::npos);
+
+  const json pull = explained(folder, kArm, "sim:friction=0.01,pull=3:0.3");
+  EXPECT_EQ(pull["verdict"], "named");
+  EXPECT_EQ(pull["effects"][0]["id"], "joint_pull");
+  EXPECT_EQ(pull["effects"][0]["joint"], 3);
+
+  const json zero = explained(folder, kArm, "sim:friction=0.01,zero=2:0.02");
+  EXPECT_EQ(zero["verdict"], "named");
+  EXPECT_EQ(zero["effects"][0]["id"], "angle_zero");
+  EXPECT_NEAR(zero["effects"][0]["parameters"]["zero"]["value"].get<double>(), -0.02,
+              0.001);  // reads too much
+
+  std::string text = read_text(kArm);
+  text.replace(text.find("-0.330 m"), 8, "-0.300 m");  // somebody measured 3 cm too little
+  std::ofstream(folder / "short.toml") << text;
+  const json length = explained(folder, folder / "short.toml", "sim:friction=0.01");
+  EXPECT_EQ(length["verdict"], "named");
+  EXPECT_EQ(length["effects"][0]["id"], "link_length");
+  EXPECT_NEAR(length["effects"][0]["parameters"]["length_error"]["value"].get<double>(), -0.03, 0.003);
+  EXPECT_EQ(length["lookalikes"], json::array({"m1"}));
+}
+
 TEST(ArmPoses, an_unplanned_arm_is_told_what_to_do) {
   const ScratchFolder folder;
   EXPECT_EQ(run_program({"isac-log", "--arm", kArm, "-o", folder / "run"}).exit_code, 2);
@@ -103,6 +154,21 @@ TEST(ArmPoses, a_pose_at_a_limit_is_moved_inwards_and_that_is_said) {
       run_program({"isac-log", "--arm", kArm, "--plan", folder / "plan.csv", "-o", folder / "run"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("joint 1 goes to 76.5 instead of 85.0 deg"), std::string::npos) << run.out;
+}
+
+TEST(ArmPoses, a_pose_beyond_the_muscles_is_left_out_and_that_is_said) {
+  const ScratchFolder folder;
+  std::ofstream(folder / "plan.csv")
+      << "theta1 [deg],theta2 [deg],theta3 [deg],theta4 [deg],theta5 [deg],theta6 [deg]\n"
+         "0,0,20,0,0,0\n0,75,0,0,0,0\n";  // 16.9 N m/rad of muscle 2 alone ask for 1.8 kg/cm2
+  const test::Run run = run_program({"isac-log", "--arm", kArm, "--plan", folder / "plan.csv", "-o",
+                                     folder / "run", "--limit-delta-pressure", "1.5 kg/cm2"});
+  EXPECT_EQ(run.exit_code, 1) << run.err;
+  EXPECT_NE(run.out.find("joint 2's muscles are at the limit of their pressure: left out"), std::string::npos)
+      << run.out;
+  const std::string rows = read_text(folder / "run/poses.csv");
+  EXPECT_NE(rows.find(",1,-1,"), std::string::npos);
+  EXPECT_EQ(rows.find(",2,-1,"), std::string::npos);
 }
 
 TEST(ArmPoses, an_arm_without_actuators_cannot_be_held) {

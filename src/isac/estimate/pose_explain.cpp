@@ -26,6 +26,7 @@ constexpr double kMostLeftOut = 0.2;    // of the poses
 constexpr double kAssumed = 0.1;        // N m, where nothing is told and nothing left over (seed 3.4)
 constexpr long kFewest = 8;             // torques left over, to estimate noise from
 constexpr double kTwoSided = 1.959964;
+constexpr const char* kLoadName = "a load in the hand";
 constexpr double kAlike = 0.995;  // cosine between two columns that nobody tells apart
 
 double f_upper(double ratio, double k, double freedom) {
@@ -328,7 +329,10 @@ void Explainer::fill_gaps(const Tried* best) {
     after_sum[row.joint] += std::pow(after[at] * row.noise, 2);
     noise_sum[row.joint] += row.noise * row.noise;
     count[row.joint] += 1;
+    out_.rows.push_back(
+        {row.pose, static_cast<int>(row.joint), residual_[at] * row.noise, after[at] * row.noise});
   }
+  for (const MassPose& pose : problem_.poses) out_.pose_names.push_back(pose.name);
   double all = 0;
   for (std::size_t j = 0; j < kArmJoints; ++j) {
     if (!(count[j] > 0)) continue;
@@ -364,6 +368,7 @@ void Explainer::conclude() {
     for (PoseFinding& f : all) {
       if (f.parameters.size() != 1) continue;
       f.parameters[0].value = 3 * f.parameters[0].std_error;
+      if (f.id == "hand_load") f.name = kLoadName;
       out_.could_hide.push_back(f);
     }
     fill_gaps(nullptr);

@@ -59,6 +59,12 @@ struct PoseJointGap {
   double noise = 0;              ///< N m
 };
 
+struct PoseGap {
+  std::size_t pose = 0;          ///< index into pose_names
+  int joint = 0;                 ///< from 0
+  double before = 0, after = 0;  ///< N m, residual without and with the best hypothesis
+};
+
 struct PoseExplanation {
   PoseVerdict verdict = PoseVerdict::kNone;
   std::vector<PoseFinding>
@@ -71,6 +77,8 @@ struct PoseExplanation {
       could_hide;  ///< for none: three standard errors of each, the largest that could be there unseen
   std::vector<std::string> outliers;  ///< poses left out, because no hypothesis could explain them
   std::vector<PoseJointGap> gaps;
+  std::vector<PoseGap> rows;
+  std::vector<std::string> pose_names;
   double p_value = 1;            ///< that nothing is missing
   double before = 0, after = 0;  ///< N m, rms of all residuals
   double noise = 0;              ///< N m, rms of what they were weighted with

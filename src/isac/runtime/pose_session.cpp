@@ -36,6 +36,7 @@ constexpr double kAverage = 0.5;                // s
 constexpr double kRestDrift = 0.1 * kDegree;
 constexpr double kSpareAngle = 3 * kDegree;  // to a limit, for what a start of the last stretch overshoots
 constexpr double kBeside = 0.3 * kDegree;    // of the plan: some steps of an encoder
+constexpr double kAtLimit = 0.999;           // of Δp: half a code of the valves
 constexpr double kGoldenRatio = 0.6180339887498949;
 constexpr int kSpeedTicks = 4;  // over which a speed is taken: one step of the encoder is a jump
 
@@ -188,6 +189,8 @@ class Holder {
     out.delta_pressure = delta_;
     for (std::size_t j = 0; j < joints_; ++j) {
       out.phi[j] = sum[j] / count;
+      if (std::abs(delta_[j]) >= kAtLimit * options_.delta_pressure_limit)
+        out.saturated = static_cast<int>(j);
       out.drift = std::max(out.drift, high[j] - low[j]);
       if (std::abs(out.phi[j] - target[j]) <= out.distance) continue;
       out.distance = std::abs(out.phi[j] - target[j]);
@@ -358,30 +361,32 @@ PoseSessionResult hold_poses(const PoseSessionOptions& options, PoseObserver& ob
   const std::vector<ArmAngles> targets = targets_of(options, observer);
   Holder holder(options, stop);
   const auto log = open_log(options);
+  const auto joints = static_cast<std::size_t>(options.arm.joints);
   PoseSessionResult result;
   try {
     holder.start_up();
     for (std::size_t i = 0; i < targets.size(); ++i) {
+      std::vector<std::vector<double>> rows;
+      bool usable = true;
       for (const int side : {1, -1}) {
         HeldPose held{.pose = static_cast<long>(i) + 1};
-        if (stop.load() ||
-            !holder.hold(beside(targets[i], result.rows.size(), static_cast<std::size_t>(options.arm.joints)),
-                         side, held))
-          return result;
-        std::vector<double> row = {holder.time(), static_cast<double>(held.pose), static_cast<double>(side)};
-        for (int j = 0; j < options.arm.joints; ++j)
-          row.push_back(held.phi[static_cast<std::size_t>(j)] / kDegree);
-        for (int j = 0; j < options.arm.joints; ++j)
-          row.push_back(held.delta_pressure[static_cast<std::size_t>(j)] / kPascalPerKgfCm2);
-        log->append(row);
+        const ArmAngles target = beside(targets[i], result.rows.size(), joints);
+        if (stop.load() || !holder.hold(target, side, held)) return result;
+        rows.push_back({holder.time(), static_cast<double>(held.pose), static_cast<double>(side)});
+        for (std::size_t j = 0; j < joints; ++j) rows.back().push_back(held.phi[j] / kDegree);
+        for (std::size_t j = 0; j < joints; ++j)
+          rows.back().push_back(held.delta_pressure[j] / kPascalPerKgfCm2);
+        usable = usable && held.saturated < 0;
         result.rows.push_back(held);
         observer.held(held, result.rows.size(), 2 * targets.size());
       }
+      for (const std::vector<double>& row : rows)
+        if (usable) log->append(row);
     }
   } catch (const Error& error) {
-    throw Error(error.kind(), error.code(),
-                error.text() +
-                    fmt::format("; {} rows until then are in {}", result.rows.size(), options.file.string()));
+    throw Error(
+        error.kind(), error.code(),
+        error.text() + fmt::format("; {} rows until then are in {}", log->rows(), options.file.string()));
   }
   log->close();
   result.complete = true;

@@ -8,7 +8,7 @@
 ///   at the pose           commands stand still; after 9 T_C the angles are averaged
 ///
 /// Friction has the other sign from the other side, so that it cancels in the mean of both (estimate/mass_fit.hpp). A pose nearer to a
-/// limit than it can be approached from is moved inwards, and that is said; one that the muscles cannot reach is recorded where the arm stood.
+/// limit than it can be approached from is moved inwards, and that is said; one at which a joint's Δp is at its limit is left out, and that is said.
 /// Every row stands up to 0.3 deg beside the plan, each elsewhere: steps of the encoders then average out like noise, and
 /// `# angle_resolution` tells isac-identify masses how large they are.
 /// Columns: time [s], pose [1], approach [1], phi1 … [deg], dp1 … [kg/cm2]; a row per pose and side.
@@ -50,6 +50,7 @@ struct HeldPose {
   double distance = 0;  ///< rad, largest of any joint from the planned angle
   int farthest = 0;     ///< that joint, from 0
   bool at_rest = false;
+  int saturated = -1;  ///< joint whose Δp stood at its limit: what its friction does is not known; −1: none
 };
 
 class PoseObserver {
@@ -60,8 +61,8 @@ class PoseObserver {
 };
 
 struct PoseSessionResult {
-  std::vector<HeldPose> rows;
-  bool complete = false;  ///< false: `stop` was raised before the last pose
+  std::vector<HeldPose> rows;  ///< those left out too
+  bool complete = false;       ///< false: `stop` was raised before the last pose
 };
 
 [[nodiscard]] PoseSessionResult hold_poses(const PoseSessionOptions& options, PoseObserver& observer,
