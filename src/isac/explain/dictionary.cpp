@@ -88,6 +88,20 @@ const std::vector<Function>& functions() {
   return all;
 }
 
+constexpr double kTypicalLag = 0.17;  // s, of a valve unit (seed 4.1)
+
+/// The pressure that a command asks for, as slow as a valve unit is.
+std::vector<double> lagged(const std::vector<double>& command, double interval) {
+  const double keep = std::exp(-interval / kTypicalLag);
+  std::vector<double> out(command.size());
+  double p = command.empty() ? 0 : command.front();
+  for (std::size_t k = 0; k < command.size(); ++k) {
+    out[k] = p;
+    p = command[k] + keep * (p - command[k]);
+  }
+  return out;
+}
+
 double largest(double so_far, double value) {
   return std::isfinite(value) ? std::max(so_far, std::abs(value)) : so_far;
 }
@@ -98,6 +112,9 @@ struct Dictionary::Signals {
   Scaled top{1e-9, 1e-9, 1e-9, 1e-9, 1, 1e-9, 1e-9, 1e-9, 1e-9, 1};
   struct Extra {
     std::vector<double> rate[2], age, sign;
+    /// In a pressure's own chain the measured pressure would bring its slow noise along, which is the residual's; what was
+    /// asked for has none.
+    std::vector<double> asked[2], asked_rate[2];
   };
   std::vector<Extra> extra;
 };
@@ -110,10 +127,17 @@ Dictionary::Dictionary(const Prepared& data) : data_(&data) {
     const PreparedRun& run = data.runs[r];
     Signals::Extra& e = signals->extra[r];
     const std::size_t n = run.time.size();
+    const auto rate_of = [&](const std::vector<double>& p) {
+      std::vector<double> rate(n, 0.0);
+      for (std::size_t k = 5; k + 5 < n && !p.empty(); ++k)
+        rate[k] = (p[k + 5] - p[k - 5]) / (10 * run.interval);
+      return rate;
+    };
     for (int i = 0; i < 2; ++i) {
-      e.rate[i].assign(n, 0.0);
-      for (std::size_t k = 5; k + 5 < n && run.has_pressure; ++k)
-        e.rate[i][k] = (run.pressure[i][k + 5] - run.pressure[i][k - 5]) / (10 * run.interval);
+      e.rate[i] = rate_of(run.pressure[i]);
+      if (!run.has_command) continue;
+      e.asked[i] = lagged(run.command[i], run.interval);
+      e.asked_rate[i] = rate_of(e.asked[i]);
     }
     e.age.assign(n, 1.0);
     e.sign.assign(n, 0.0);
@@ -179,10 +203,12 @@ Eigen::VectorXd Dictionary::rows(std::size_t column) const {
       s.age = e.age[k];
     }
     if (run.has_pressure) {
-      s.dp = 0.5 * (run.pressure[1][k] - run.pressure[0][k]) / top.dp;
-      s.p0 = (0.5 * (run.pressure[1][k] + run.pressure[0][k]) - data_->rig.initial_pressure) / top.p0;
-      s.rate1 = e.rate[0][k] / top.rate1;
-      s.rate2 = e.rate[1][k] / top.rate2;
+      const bool own = row.chain == Chain::kPressure1 || row.chain == Chain::kPressure2;
+      const auto &p = own ? e.asked : run.pressure, &rate = own ? e.asked_rate : e.rate;
+      s.dp = 0.5 * (p[1][k] - p[0][k]) / top.dp;
+      s.p0 = (0.5 * (p[1][k] + p[0][k]) - data_->rig.initial_pressure) / top.p0;
+      s.rate1 = rate[0][k] / top.rate1;
+      s.rate2 = rate[1][k] / top.rate2;
     }
     s.time = run.time[k] / top.time;
     s.day = (run.day_offset + run.time[k]) / top.day;
