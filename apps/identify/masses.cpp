@@ -28,7 +28,8 @@
 namespace isac::apps {
 namespace {
 
-constexpr int kMostPoses = 500;  // of a design; more is a mistake in the call
+constexpr int kMostPoses = 500;          // of a design; more is a mistake in the call
+constexpr std::size_t kPosesShown = 24;  // on the terminal; the answer and the report have all
 constexpr double kMuscleShare =
     0.9;  // of the limit of Δp that a planned pose may ask: the masses are not known yet
 constexpr double kSpareAngle =
@@ -101,6 +102,47 @@ nlohmann::ordered_json details_of(const estimate::MassFit& fit, const estimate::
     extra["sensitivity"].push_back(
         {{"cause", s.cause}, {"unit", s.unit}, {"kg_per_unit", by_mass(arm.mass_names, s.per_unit)}});
   return extra;
+}
+
+/// Residuals pose by pose; of many poses those out of line and the worst of the others.
+void print_poses(const estimate::MassFit& fit) {
+  struct Line {
+    std::size_t pose = 0;
+    double squares = 0, count = 0, largest = 0;
+    int joint = 0;
+  };
+  std::vector<Line> lines(fit.poses.size());
+  for (std::size_t p = 0; p < lines.size(); ++p) lines[p].pose = p;
+  for (const estimate::MassRow& row : fit.rows) {
+    Line& line = lines[row.pose];
+    line.squares += row.residual * row.residual;
+    line.count += 1;
+    if (std::abs(row.residual) < std::abs(line.largest)) continue;
+    line.largest = row.residual;
+    line.joint = row.joint;
+  }
+  const auto odd = [&](const Line& line) {
+    return fit.poses[line.pose].outlier || fit.poses[line.pose].left_out;
+  };
+  if (lines.size() > kPosesShown) {
+    std::stable_sort(lines.begin(), lines.end(), [&](const Line& a, const Line& b) {
+      return odd(a) != odd(b) ? odd(a) : fit.poses[a.pose].p_value < fit.poses[b.pose].p_value;
+    });
+    const auto all_odd = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), odd));
+    lines.resize(std::max(all_odd, kPosesShown));
+  }
+  fmt::print("{:<22} {:>10}  {:<24} {:>8}\n", "pose", "rms N m", "largest", "p");
+  for (const Line& line : lines) {
+    const estimate::MassPoseResult& pose = fit.poses[line.pose];
+    if (!(line.count > 0)) continue;
+    fmt::print("{:<22} {:10.3g}  {:<24} {:8.2g}{}\n", pose.name, std::sqrt(line.squares / line.count),
+               fmt::format("{:+.3g} on joint {}", line.largest, line.joint + 1), pose.p_value,
+               pose.left_out  ? "  left out: the others contradict it"
+               : pose.outlier ? "  out of line"
+                              : "");
+  }
+  if (lines.size() < fit.poses.size())
+    fmt::print("({} more poses in line; all are in --json and --report)\n", fit.poses.size() - lines.size());
 }
 
 void print_design(const estimate::PoseDesign& design, const estimate::MassArm& arm) {
@@ -251,6 +293,7 @@ int run_masses(const Call& call, const std::string& json_path) {
         "are {}\n",
         fit.rmse, fit.rows.size(), fit.poses.size(), fit.degrees_of_freedom, fit.condition,
         fit.sign == estimate::TorqueSign::kActuator ? "those that hold the arm" : "those of gravity");
+    print_poses(fit);
     print_warnings(fit.warnings);
     print_design(design, arm);
   }

@@ -170,6 +170,68 @@ TEST(MassesProgram, reads_another_arm_through_its_file_and_maps) {
   EXPECT_TRUE(warns(answer, "pose_left_out"));
 }
 
+/// A planar arm of three links that another lab built, on its side: joints about z, gravity along −y.
+TEST(MassesProgram, reads_a_three_link_arm_and_names_the_outlier_in_text_answer_and_report) {
+  const ScratchFolder folder;
+  std::ofstream(folder / "arm.toml")
+      << "format = \"isac.arm/1\"\nname = \"three links\"\n"
+         "[gravity]\ndirection = [0, -1, 0]\nacceleration = \"9.8 m/s2\"\n"
+         "[[joint]]\n[[joint]]\na = \"0.5 m\"\n[[joint]]\na = \"300 mm\"\n"
+         "[[mass]]\nname = \"thigh\"\nlink = 1\nposition = [\"0.25 m\", \"0 m\", \"0 m\"]\n"
+         "[[mass]]\nname = \"shank\"\nlink = 2\nposition = [\"0.15 m\", \"0 m\", \"0 m\"]\n"
+         "[[mass]]\nname = \"foot\"\nlink = 3\nposition = [\"80 mm\", \"0 m\", \"0 m\"]\n";
+  std::ofstream file(folder / "lab.csv");
+  file.precision(12);
+  file << "Pose;q1 [grad];q2 [grad];q3 [grad];M1 in kgf cm;M2 in kgf cm;M3 in kgf cm\n";
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> angle(-80, 80);
+  const double truth[] = {6.2, 3.1, 0.9}, kgf_cm = 0.0980665;
+  for (int i = 0; i < 30; ++i) {
+    const double q[] = {angle(random), angle(random), angle(random)};
+    const double c1 = std::cos(q[0] * kDegree), c12 = std::cos((q[0] + q[1]) * kDegree),
+                 c123 = std::cos((q[0] + q[1] + q[2]) * kDegree);
+    // τ = −∂V/∂q of V = g Σ m y, written out
+    const double t3 = -9.8 * truth[2] * 0.08 * c123;
+    const double t2 = t3 - 9.8 * (truth[1] * 0.15 + truth[2] * 0.3) * c12;
+    const double t1 = t2 - 9.8 * (truth[0] * 0.25 + (truth[1] + truth[2]) * 0.5) * c1;
+    file << i + 1;
+    for (const double a : q) file << ";" << a;
+    for (const double t : {t1, t2 + (i == 17 ? 4.0 : 0), t3})
+      file << ";" << (t + 0.05 * normal(random)) / kgf_cm;
+    file << "\n";
+  }
+  file.close();
+  std::vector<std::string> call = {folder / "lab.csv", "--arm", folder / "arm.toml", "--report",
+                                   folder / "report.html"};
+  for (int k = 1; k <= 3; ++k) {
+    const std::string n = std::to_string(k);
+    call.insert(call.end(), {"--map", "theta" + n + "=\"q" + n + " [grad]\":deg", "--map",
+                             "tau" + n + "=\"M" + n + " in kgf cm\":kgf cm"});
+  }
+  const json answer = fit(call);
+  EXPECT_EQ(answer["torques"], "gravity");
+  const char* names[] = {"thigh", "shank", "foot"};
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(value(answer, names[k]), truth[k], 4 * std_error(answer, names[k])) << names[k];
+    EXPECT_LT(std_error(answer, names[k]), 0.05) << names[k];
+  }
+  EXPECT_EQ(answer["residuals"].size(), 90u);
+  for (const json& pose : answer["poses"]) EXPECT_EQ(pose["outlier"].get<bool>(), pose["name"] == "row 18");
+  EXPECT_NEAR(answer["torque_noise"]["value"].get<double>(), 0.05, 0.01);
+  const std::string page = read_text(folder / "report.html");
+  EXPECT_NE(page.find("row 18"), std::string::npos);
+  EXPECT_NE(page.find("left out"), std::string::npos);
+
+  call.insert(call.begin(), {"isac-identify", "masses"});
+  call.insert(call.end(), {"--design", "0"});
+  const test::Run run = run_program(call);
+  const auto row = run.out.find("row 18 ");
+  ASSERT_NE(row, std::string::npos) << run.out;
+  EXPECT_NE(run.out.substr(row, 120).find("on joint 2"), std::string::npos) << run.out;
+  EXPECT_NE(run.out.substr(row, 120).find("left out"), std::string::npos) << run.out;
+}
+
 TEST(MassesProgram, joint_angles_and_arm_angles_give_the_same_masses) {
   const ScratchFolder folder;
   const auto poses = some_poses(6);
