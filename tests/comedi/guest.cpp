@@ -13,10 +13,14 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "isac/card/comedi_card.hpp"
 #include "isac/core/error.hpp"
+#include "isac/core/units.hpp"
+#include "isac/record/arm_file.hpp"
 #include "isac/record/csv_reader.hpp"
 #include "isac/runtime/control_session.hpp"
 #include "isac/runtime/control_setup.hpp"
@@ -149,7 +153,23 @@ struct Wish {
   std::function<void()> act;
   int joints = 1;
   std::int64_t beat_limit = 10'000'000;  ///< ns
+  bool line = false;                     ///< of the hand, the arm compensated, instead of a sine
 };
+
+/// The seed's arm in a pose that its inverse kinematics likes, with the testbed's muscles: the rig in the kernel has no better.
+void along_a_line(runtime::ControlRun& run) {
+  record::ArmFile arm = record::read_arm("/right_soft_arm.toml");
+  arm.middle = {0, -kPi / 4, -kPi / 4, 0, kPi / 2, 0};
+  models::ParameterTable six;
+  six.joint_count = 6;
+  runtime::compensate_arm(run.settings, arm, six, "right_soft_arm.toml");
+  run.motion.kind = runtime::Motion::Kind::kLine;
+  run.motion.rest = 0.2;
+  run.motion.duration = 0.1;
+  run.motion.path = std::make_shared<runtime::LinePath>(
+      runtime::reach_of(arm, run.settings, "right_soft_arm.toml"), models::JointVector<double, 6>{},
+      std::vector<runtime::LinePiece>{{true, {0, 0, 0.05}}, {true, {0, 0.03, 0}}}, 0.2);
+}
 
 ControlOutcome run(const Wish& wish) {
   runtime::ControlRun run;
@@ -165,6 +185,7 @@ ControlOutcome run(const Wish& wish) {
                 .duration = wish.seconds,
                 .points = {},
                 .path = {}};
+  if (wish.line) along_a_line(run);
   run.log = "/" + wish.name + ".csv";
   run.flight = "/" + wish.name + ".flight.csv";
   run.beat.beat = wish.beat_limit;
@@ -173,10 +194,11 @@ ControlOutcome run(const Wish& wish) {
   return runtime::run_control(run, saboteur, never);
 }
 
-void loop_in_time(const std::string& table, const std::string& name, int joints, const char* angle_column) {
+void loop_in_time(const std::string& table, const std::string& name, int joints, const char* angle_column,
+                  bool line = false) {
   const int beats_before = beats();
   const ControlOutcome outcome =
-      run({.table = table, .name = name, .seconds = 1.0, .act = {}, .joints = joints});
+      run({.table = table, .name = name, .seconds = 1.0, .act = {}, .joints = joints, .line = line});
   const auto edges = beats() - beats_before;
   check(outcome.as_planned() && outcome.loop.why == LoopEnd::Why::kDone,
         name + ": played to its end at 2 kHz");
@@ -254,6 +276,7 @@ void all() {
   comedi_test_card("/dev/comedi2");
   loop_in_time(two, "testbed", 1, "angle");
   loop_in_time("/soft_arm.toml", "soft_arm", 6, "phi1");
+  loop_in_time("/soft_arm.toml", "line", 6, "phi2", true);
   dies(
       two, "SIGKILL", [] { raise(SIGKILL); }, Why::kDied, kPatient);
   dies(

@@ -16,7 +16,7 @@ root=root.$$
 trap 'rm -rf "$folder/$root" "$folder/initrd.$$"' EXIT
 rm -rf "$root"; mkdir -p $root/bin $root/modules $root/tmp
 cp "$busybox" $root/bin/busybox; cp "$program" $root/bin/guest
-cp "$source/../../data/cards/soft_arm.toml" $root/
+cp "$source/../../data/cards/soft_arm.toml" "$source/../../data/arms/right_soft_arm.toml" $root/
 ldd "$program" | awk '{for (i = 1; i <= NF; i++) if ($i ~ /^\//) print $i}' | while read -r library; do
   mkdir -p "$root$(dirname "$library")"; cp -L "$library" "$root$library"
 done

@@ -1,4 +1,5 @@
-// isac-run on the simulated arm of six joints: lines of the hand, leading by hand, replay bit for bit; and the PID on one joint.
+// isac-run on the simulated arm of six joints: lines of the hand, leading by hand, replay bit for bit; and on one joint the PID and what was
+// identified, fed forward and predicted.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -231,6 +232,89 @@ TEST(IsacRunPid, runs_beside_the_cascades_and_replays_to_the_last_bit) {
             read_recording(folder / "pid.csv").column("p1_cmd").values);
   const auto torque = run_program({"isac-run", "hand", "--controller", "pid"});
   EXPECT_NE(torque.exit_code, 0);
+}
+
+/// The testbed with the seed's gains and a valve of 20 ms, quick enough to bring a torque while it is wanted.
+std::string quick_params(double dead_time, double friction) {
+  std::ostringstream text;
+  text << R"(format = "isac.params/1"
+created = "2003-05-01T12:00:00Z"
+[[joint]]
+label = "testbed"
+constants = { wheel_radius_m = 0.019, initial_pressure_Pa = 294199.5, inertia_kg_m2 = 0.0085 }
+[joint.parameters]
+A = { value = -23450.0, unit = "N/m" }
+B = { value = 174.2, unit = "N cm2/kg" }
+C = { value = 0.0026, unit = "N m s3" }
+D = { value = 0.14, unit = "N m s" }
+[gains]
+[gains.parameters]
+K_P_position = { value = 4.0, unit = "N m/rad" }
+K_I_position = { value = 8.0, unit = "N m/rad s" }
+K_P_torque = { value = 0.1, unit = "kg/cm2/N m" }
+K_I_torque = { value = 10.0, unit = "kg/cm2/N m s" }
+[pcu]
+[pcu.parameters]
+T_C = { value = 0.02, unit = "s" }
+)";
+  if (dead_time > 0) text << "dead_time = { value = " << dead_time << ", unit = \"s\" }\n";
+  if (friction > 0)
+    text << "[[effects]]\nlabel = \"coulomb_friction\"\n[effects.parameters]\ncoulomb_friction = { value = "
+         << friction << ", unit = \"N m\" }\n";
+  return text.str();
+}
+
+TEST(IsacRunModel, friction_that_was_identified_is_fed_forward_and_cuts_the_error_of_a_slow_sine) {
+  const ScratchFolder folder;
+  double worst[2] = {};
+  for (const bool known : {false, true}) {
+    const std::string params = folder / "params.toml", log = folder / (known ? "known.csv" : "unknown.csv");
+    std::ofstream(params) << quick_params(0, known ? 0.3 : 0);
+    const auto made = run_program({"isac-run", "position", "--sine", "0.3 rad", "--frequency", "0.159155 Hz",
+                                   "--duration", "10 s", "--params", params, "--card",
+                                   "sim:T_C=0.02,effect=coulomb_friction:0.3", "-o", log});
+    ASSERT_EQ(made.exit_code, 0) << made.err << made.out;
+    const auto run = read_recording(log);
+    const auto &time = run.column("time").values, &angle = run.column("angle").values,
+               &wanted = run.column("angle_wanted").values;
+    for (std::size_t k = 0; k < run.rows(); ++k) {
+      if (time[k] > 6 && run.column("phase").values[k] == 2.0)
+        worst[known ? 1 : 0] = std::max(worst[known ? 1 : 0], std::abs(angle[k] - wanted[k]));
+    }
+  }
+  std::printf("largest error %.1f mrad without and %.1f mrad with the known friction\n", 1e3 * worst[0],
+              1e3 * worst[1]);
+  EXPECT_LT(worst[1], 0.3 * worst[0]);
+}
+
+TEST(IsacRunModel, dead_time_that_was_identified_is_predicted_away_and_lessens_the_overshoot) {
+  const ScratchFolder folder;
+  const std::string params = folder / "params.toml";
+  std::ofstream(params) << quick_params(0.05, 0);
+  double highest[2] = {};
+  for (const bool predicted : {false, true}) {
+    const std::string log = folder / (predicted ? "with.csv" : "without.csv");
+    std::vector<std::string> words = {"isac-run",   "position", "--step",      "0.2 rad",
+                                      "--duration", "4 s",      "--following", "3 rad",
+                                      "--params",   params,     "--card",      "sim:T_C=0.02,dead_time=0.05",
+                                      "-o",         log};
+    if (predicted) words.push_back("--predictor");
+    const auto made = run_program(words);
+    ASSERT_EQ(made.exit_code, 0) << made.err << made.out;
+    const auto run = read_recording(log);
+    const auto& angle = run.column("angle").values;
+    highest[predicted ? 1 : 0] = *std::max_element(angle.begin(), angle.end()) / 0.2 - 1;
+    const auto replayed = run_program({"isac-run", "replay", log, "--params", params});
+    EXPECT_EQ(replayed.exit_code, 0) << replayed.err << replayed.out;
+  }
+  std::printf("overshoot %.1f %% without and %.1f %% with the predictor\n", 100 * highest[0],
+              100 * highest[1]);
+  EXPECT_LT(highest[1], 0.8 * highest[0]);
+  std::ofstream(params) << quick_params(0, 0);
+  const auto refused =
+      run_program({"isac-run", "position", "--step", "0.1 rad", "--params", params, "--predictor"});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.err.find("no inertia or no dead time"), std::string::npos) << refused.err;
 }
 
 }  // namespace
