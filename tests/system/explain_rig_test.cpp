@@ -1,0 +1,101 @@
+// isac-explain on the simulated rig, from the first recording to the name: nothing hidden, one effect, two that are tied until
+// the sweep that was asked for is recorded (docs/tutorials/tell-two-effects-apart.md).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "run_program.hpp"
+
+namespace isac::test {
+namespace {
+
+using nlohmann::json;
+
+std::vector<std::string> ids(const json& candidates) {
+  std::vector<std::string> names;
+  for (const json& one : candidates) names.push_back(one["id"]);
+  return names;
+}
+
+bool holds(const std::vector<std::string>& list, const char* name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
+
+class ExplainOnTheRig : public testing::Test {
+ protected:
+  void log(const std::string& card, std::vector<std::string> words) {
+    words.insert(words.begin(), "isac-log");
+    words.insert(words.end(), {"--card", "sim:" + card, "--rig", rig_, "-o", folder_ / "dataset"});
+    const auto run = run_program(words);
+    ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
+  }
+  void log_first_afternoon(const std::string& card) {
+    log(card, {"--plan", std::string(ISAC_SOURCE_DIR) + "/docs/tutorials/tell-two-effects-apart/first.toml"});
+  }
+  json explain() {
+    const auto run = run_program(
+        {"isac-explain", folder_ / "dataset", "--rig", rig_, "--plan", folder_ / "next.toml", "--json", "-"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return json::parse(run.out, nullptr, false);
+  }
+  const std::string rig_ = std::string(ISAC_SOURCE_DIR) + "/data/rigs/testbed.toml";
+  ScratchFolder folder_;
+};
+
+TEST_F(ExplainOnTheRig, names_nothing_where_nothing_is_hidden) {
+  log_first_afternoon("seed=5");
+  const json few = explain();
+  EXPECT_TRUE(few["verdict"] == "none" || few["verdict"] == "immaterial") << few["summary"];
+  EXPECT_TRUE(few["effects"].empty());
+  EXPECT_TRUE(few["alternatives"].empty());
+}
+
+TEST_F(ExplainOnTheRig, names_nothing_in_all_sweeps_of_a_rig_without_an_effect) {
+  log("seed=2003", {"all"});
+  const json all = explain();
+  EXPECT_TRUE(all["verdict"] == "none" || all["verdict"] == "immaterial") << all["summary"];
+  EXPECT_TRUE(all["effects"].empty());
+}
+
+TEST_F(ExplainOnTheRig, names_a_hidden_stiffness_with_its_number_and_shrinks_the_gap_on_runs_it_never_saw) {
+  log("seed=11,effect=cubic_stiffness:0.4", {"all"});
+  const json found = explain();
+  EXPECT_EQ(found["verdict"], "named") << found["summary"];
+  ASSERT_EQ(ids(found["effects"]), std::vector<std::string>{"cubic_stiffness"});
+  const json& k3 = found["effects"][0]["parameters"]["k3"];
+  EXPECT_LT(k3["ci95"][0].get<double>(), 0.4);
+  EXPECT_GT(k3["ci95"][1].get<double>(), 0.4);
+  EXPECT_NEAR(k3["value"].get<double>(), 0.4, 0.004);  // one per cent, six of its standard errors
+  // The sensors' own noise leaves about 0.0085 N m on these three runs.
+  EXPECT_LT(found["gap"]["heldout_after"].get<double>(), 0.45 * found["gap"]["heldout_before"].get<double>());
+  EXPECT_GT(found["gap"]["share_closed"].get<double>(), 0.8);
+}
+
+TEST_F(ExplainOnTheRig, tells_two_effects_apart_after_the_one_sweep_that_it_asks_for) {
+  const std::string effect = ",effect=muscle_asymmetry:3.6e-6";
+  log_first_afternoon("seed=5" + effect);
+  const json before = explain();
+  std::vector<std::string> tied = ids(before["effects"]);
+  for (const std::string& id : ids(before["alternatives"])) tied.push_back(id);
+  EXPECT_TRUE(holds(tied, "muscle_asymmetry")) << before["summary"];
+  EXPECT_TRUE(holds(tied, "torque_offset")) << before["summary"];
+  EXPECT_LT(before["separation"]["now_sigma"].get<double>(), 1);
+  EXPECT_GT(before["separation"]["expected_sigma"].get<double>(), 5);
+
+  log("seed=15" + effect, {"--plan", folder_ / "next.toml"});
+  const json after = explain();
+  EXPECT_EQ(after["verdict"], "named") << after["summary"];
+  ASSERT_EQ(ids(after["effects"]), std::vector<std::string>{"muscle_asymmetry"});
+  EXPECT_TRUE(after["alternatives"].empty());
+  // 3.6e-6 N/Pa at 98066.5 Pa per kg/cm².
+  const json& b = after["effects"][0]["parameters"]["b"];
+  EXPECT_LT(b["ci95"][0].get<double>(), 0.35304);
+  EXPECT_GT(b["ci95"][1].get<double>(), 0.35304);
+  EXPECT_TRUE(holds(ids(after["rejected"]), "torque_offset"));
+}
+
+}  // namespace
+}  // namespace isac::test
