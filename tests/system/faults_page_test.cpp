@@ -38,7 +38,7 @@ TEST(FaultsPage, every_behaviour_has_proofs_that_exist) {
   }
   EXPECT_EQ(behaviours.size(), 18u);
   for (const char* name : {"SIGKILL", "abort", "SIGSEGV", "hang", "stall_two_cards", "stall_one_card",
-                           "testbed", "soft_arm", "enc_jump", "empty", "fail_read"})
+                           "testbed", "soft_arm", "line", "enc_jump", "empty", "fail_read"})
     EXPECT_NE(guest.find("\"" + std::string(name) + "\""), std::string::npos) << name;
 }
 
