@@ -6,6 +6,7 @@
 #include <span>
 
 #include "arm_loop.hpp"
+#include "instruction_counter.hpp"
 #include "isac/models/parameter_table.hpp"
 #include "semihosting.hpp"
 #include "simulated_arm.hpp"
@@ -20,25 +21,6 @@ namespace {
 using namespace isac::embedded;
 
 constexpr int kRefusedTicks = 1000;
-
-/// Instructions by SysTick: with `-icount shift=8` an instruction is 256 ns, which are 6.4 ticks of 25 MHz.
-class Counter {
- public:
-  static void begin() noexcept {
-    at(0xE000E014) = 0xFFFFFF;
-    at(0xE000E018) = 0;
-    at(0xE000E010) = 5;
-  }
-  static std::uint32_t now() noexcept { return at(0xE000E018); }
-  static std::uint32_t instructions(std::uint32_t before, std::uint32_t after) noexcept {
-    return (((before - after) & 0xFFFFFF) * 10 + 32) / 64;
-  }
-
- private:
-  static volatile std::uint32_t& at(std::uint32_t address) noexcept {
-    return *reinterpret_cast<volatile std::uint32_t*>(address);
-  }
-};
 
 /// The stack below the caller, painted before a call and looked through after it.
 class Paint {

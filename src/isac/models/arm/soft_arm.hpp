@@ -27,8 +27,8 @@ namespace isac::models {
 /// Table 4.1. The left arm has l2 < 0 (seed 4.3: d3 = −l2).
 template <class S>
 struct SoftArmGeometry {
-  S l1{0.510}, l2{0.200}, l3{0.330}, l4{0.290}, l5{0.160};
-  S m1{1.750}, m2{0.450}, m3{0.140};
+  S l1 = S(0.510), l2 = S(0.200), l3 = S(0.330), l4 = S(0.290), l5 = S(0.160);
+  S m1 = S(1.750), m2 = S(0.450), m3 = S(0.140);
 };
 
 template <class S>
@@ -41,7 +41,7 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Chain<S, 6> soft_arm_chain(const SoftArmGeometry<S>& g) noexcept {
   constexpr double kQuarterTurn = 1.57079632679489661923;
-  const S quarter(kQuarterTurn);
+  const S quarter = S(kQuarterTurn);  // the cast says that float rounds it
   Chain<S, 6> chain;
   chain.links = {{{S(0), S(0), g.l1, S(0)},
                   {-quarter, S(0), S(0), S(0)},
