@@ -73,7 +73,7 @@ void settle(ArmLoop& loop) {
 }
 
 Follow follow(const Arm& arm, const Path& path, bool compensate, double load, const ArmVector& start = {}) {
-  ArmPlantConfig truth = build(arm);
+  ArmPlantConfig truth = true_arm(arm);
   truth.load = load;
   ArmLoop loop = loop_of(truth, arm);
   loop.controller.compensate = compensate;
@@ -118,7 +118,7 @@ double ripple(const Samples& samples, int direction) {
 }
 
 TEST(ArmExperiments, z_moves_with_and_without_compensation) {
-  for (const Arm& arm : {kDiameter, kRadius, kRubbing}) {
+  for (const Arm& arm : {kDiameter, kRadius, kRubbing, kDamped}) {
     Path path(build(arm), {});
     for (int n = 0; n < 3; ++n) {
       path.to({0, 0, 0.1}, 0.2, 1.0);
@@ -135,20 +135,24 @@ TEST(ArmExperiments, z_moves_with_and_without_compensation) {
       show("7.1 %s %s: behind %.1f cm, ripple up %.3f down %.3f m/s\n", arm.name,
            compensate ? "CMBPI" : "MBPI", 100 * f.behind, ripple(f.samples, 1), ripple(f.samples, -1));
     }
-    EXPECT_LT(behind[1], behind[0]);
-    EXPECT_NEAR(behind[1], arm.radius > 1 && arm.friction < 0.02 ? 0.054 : 0.064, 0.004);
+    if (arm.damping > 1) {
+      EXPECT_NEAR(behind[1], behind[0], 0.002);  // damping holds the hand back, not its weight
+    } else {
+      EXPECT_LT(behind[1], behind[0]);
+      EXPECT_NEAR(behind[1], arm.radius > 1 && arm.friction < 0.02 ? 0.054 : 0.064, 0.004);
+    }
     // The seed sees the downward oscillation smoothed by compensation. Here compensation leaves it as it is.
     EXPECT_NEAR(down[1], down[0], 0.15 * down[0]);
   }
 }
 
 TEST(ArmExperiments, joint_one_at_0_9_rad_per_s) {
-  for (const Arm& arm : {kDiameter, kRadius}) {
+  for (const Arm& arm : {kDiameter, kRadius, kDamped}) {
     const double bend = 0.9 / arm.radius;
     const ArmVector start = {0, 0.6 / arm.radius, -bend / 2, -bend / 2, 0, 0};
     double means[2] = {}, largest[2] = {};
     for (const bool compensate : {false, true}) {
-      ArmLoop loop = loop_of(build(arm), arm);
+      ArmLoop loop = loop_of(true_arm(arm), arm);
       loop.controller.compensate = compensate;
       loop.start(start);
       settle(loop);
@@ -187,12 +191,12 @@ TEST(ArmExperiments, joint_one_at_0_9_rad_per_s) {
     }
     EXPECT_LT(means[1], means[0]);  // better on the whole, as in figure 7.2, and only by a little
     EXPECT_GT(means[1], 0.9 * means[0]);
-    EXPECT_NEAR(largest[1], arm.gains < 1 ? 0.194 : 0.135, 0.015);
+    EXPECT_NEAR(largest[1], arm.damping > 1 ? 0.242 : arm.gains < 1 ? 0.194 : 0.135, 0.015);
   }
 }
 
 TEST(ArmExperiments, triangle_with_and_without_the_can) {
-  for (const Arm& arm : {kDiameter, kRadius}) {
+  for (const Arm& arm : {kDiameter, kRadius, kDamped}) {
     const double side = 0.08;
     Path path(build(arm), {});
     path.to({0, side, 0}, 0.2, 0);
@@ -211,12 +215,16 @@ TEST(ArmExperiments, triangle_with_and_without_the_can) {
     show("7.4 %s: behind %.1f cm, with 340 g %.1f cm, apart %.1f cm, curves apart %.1f cm\n", arm.name,
          100 * empty.behind, 100 * loaded.behind, 100 * apart, 100 * curves);
     EXPECT_LT(loaded.behind, 1.25 * empty.behind);
-    EXPECT_NEAR(apart, 0.03, 0.01);
+    if (arm.damping > 1) {
+      EXPECT_LT(curves, 0.005);  // the seed's "no significant difference"
+    } else {
+      EXPECT_NEAR(apart, 0.03, 0.01);
+    }
   }
 }
 
 TEST(ArmExperiments, point_to_point_and_back) {
-  for (const Arm& arm : {kDiameter, kRadius, kRubbing}) {
+  for (const Arm& arm : {kDiameter, kRadius, kRubbing, kDamped}) {
     double before = 0;
     for (const double v : {0.2, 0.3, 0.4}) {
       const Vec3<double> way = {0, 0.07, 0.09};
@@ -233,7 +241,12 @@ TEST(ArmExperiments, point_to_point_and_back) {
       if (arm.radius > 1 && arm.friction < 0.02) {
         EXPECT_LT(off, 0.02);  // inside the seed's 4 cm at 0.3 m/s
         EXPECT_GT(f.behind, before);
-        EXPECT_NEAR(f.behind / v, 0.16, 0.03);  // the lag of the valves, 0.17 s, times the speed
+        // The lag of the valves, 0.17 s, times the speed; with damping longer than that.
+        if (arm.damping > 1) {
+          EXPECT_GT(f.behind / v, 0.17);
+        } else {
+          EXPECT_NEAR(f.behind / v, 0.16, 0.03);
+        }
       } else {
         EXPECT_GT(off, 0.02);
         EXPECT_LT(off, arm.gains < 1 ? 0.08 : 0.04);
@@ -243,42 +256,90 @@ TEST(ArmExperiments, point_to_point_and_back) {
   }
 }
 
-TEST(ArmExperiments, push_and_release) {
-  for (const Arm& arm : {kDiameter, kRadius}) {
-    double first_overshoot = 0;
-    for (const double play : {0.0, 0.01}) {
-      ArmPlantConfig truth = build(arm);
-      truth.joints[0].play = play;
-      ArmLoop loop = loop_of(truth, arm);
-      loop.start({});
-      settle(loop);
-      const Samples s = loop.run(
-          5, [&](double) { return loop.rest(); },
-          [&](double t, ArmPlant& p) {
-            p.push(t < 0.75 ? std::min(1.0, t / 0.3) * Vec3<double>{0, 20, 15} : Vec3<double>{});
-          });
-      for (std::size_t i = 0; i < 3; ++i) {
-        double out = 0, back = 0, settle = 0;
-        for (const ArmSample& x : s)
-          if (x.time <= 0.75) out = std::abs(x.angle[i]) > std::abs(out) ? x.angle[i] : out;
-        for (const ArmSample& x : s) {
-          if (x.time <= 0.75) continue;
-          back = std::max(back, -x.angle[i] / out);
-          if (std::abs(x.angle[i]) > 0.1 * std::abs(out)) settle = x.time - 0.75;
-        }
-        show("7.8 %s play %.2f joint %zu: out %.3f rad, overshoot %.0f %%, settled to 10 %% in %.2f s\n",
-             arm.name, play, i + 1, out, 100 * back, settle);
-        EXPECT_GT(back, 0.3);  // the seed: 6 to 10 %, joint one 20 %
-        EXPECT_GT(settle, 0.4);
-        EXPECT_LT(settle, 4.5);
-        if (i > 0) continue;
-        if (play > 0) {
-          EXPECT_GT(back, 1.05 * first_overshoot);  // slack makes joint one worse, as the seed suspects
-        }
-        first_overshoot = back;
-      }
+struct Push {
+  double seconds = 0.75;  ///< before the release at 0.75 s
+  double force = 25;      ///< N, up and sideways
+  double play = 0;        ///< rad, slack of joint one, either side
+};
+
+struct Release {
+  double overshoot = 0;  ///< of the displacement
+  double settled = 0;    ///< s after the release, within 10 % of the displacement or the slack
+};
+
+/// Pushed at the hand and let go: joints 1 to 3.
+std::array<Release, 3> push(const Arm& arm, const Push& how) {
+  ArmPlantConfig truth = true_arm(arm);
+  truth.joints[0].play = how.play;
+  ArmLoop loop = loop_of(truth, arm);
+  loop.start({});
+  settle(loop);
+  const ArmVector rest = loop.plant().angle();
+  const double begin = 0.75 - how.seconds, ramp = 0.4 * how.seconds;
+  const Samples s = loop.run(
+      5, [&](double) { return loop.rest(); },
+      [&](double t, ArmPlant& p) {
+        const double share = t > begin && t < 0.75 ? std::min(1.0, (t - begin) / ramp) : 0;
+        p.push(share * how.force * Vec3<double>{0, 0.8, 0.6});
+      });
+  std::array<Release, 3> out;
+  for (std::size_t i = 0; i < 3; ++i) {
+    double far = 0;
+    for (const ArmSample& x : s)
+      if (x.time <= 0.75) far = std::abs(x.angle[i] - rest[i]) > std::abs(far) ? x.angle[i] - rest[i] : far;
+    for (const ArmSample& x : s) {
+      if (x.time <= 0.75) continue;
+      const double off = x.angle[i] - rest[i];
+      out[i].overshoot = std::max(out[i].overshoot, -off / far);
+      if (std::abs(off) > std::max(0.1 * std::abs(far), i == 0 ? 1.2 * how.play : 0))
+        out[i].settled = x.time - 0.75;
     }
+    show(
+        "7.8 %s, %.2f s of %.0f N, play %.2f, joint %zu: out %.3f rad, overshoot %.0f %%, settled in %.2f "
+        "s\n",
+        arm.name, how.seconds, how.force, how.play, i + 1, far, 100 * out[i].overshoot, out[i].settled);
   }
+  return out;
+}
+
+TEST(ArmExperiments, push_and_release_with_the_tables_damping) {
+  for (const Arm& arm : {kDiameter, kRadius}) {
+    const auto tight = push(arm, {}), slack = push(arm, {.play = 0.01});
+    for (const auto& joint : tight) {
+      EXPECT_GT(joint.overshoot, 0.3);  // the seed: 6 to 10 %, joint one 20 %
+      EXPECT_GT(joint.settled, 0.4);
+      EXPECT_LT(joint.settled, 4.5);
+    }
+    EXPECT_GT(slack[0].overshoot, 1.05 * tight[0].overshoot);  // worse with slack, as the seed suspects
+  }
+}
+
+/// What does not explain figure 7.8, and what does.
+TEST(ArmExperiments, push_and_release_as_the_seed_saw_it) {
+  // Neither faster valves nor more Coulomb friction: the torque loop takes the muscles' damping away at any lag.
+  for (const double lag : {0.08, 0.04}) {
+    Arm fast = kRadius;
+    fast.lag = lag;
+    EXPECT_GT(push(fast, {})[1].overshoot, 0.6) << lag;
+  }
+  Arm rubbing = kRadius;
+  rubbing.friction = 0.06;
+  EXPECT_GT(push(rubbing, {})[1].overshoot, 0.6);
+  // A push of 0.75 s winds the outer integral up: with damping too, a fifth stays and decays with K_P/K_I = 2.5 s.
+  const auto held = push(kDamped, {.force = 50});
+  EXPECT_GT(held[2].overshoot, 0.15);
+  EXPECT_GT(held[2].settled, 2.0);
+  // Eleven times the table's damping, a short push, slack in joint one: 20 %, 6 to 10 %, 0.75 s of the seed.
+  const auto tight = push(kDamped, {.seconds = 0.2, .force = 50});
+  const auto slack = push(kDamped, {.seconds = 0.2, .force = 50, .play = 0.01});
+  EXPECT_NEAR(slack[0].overshoot, 0.20, 0.04);
+  EXPECT_GT(slack[0].overshoot, 1.3 * tight[0].overshoot);  // what the seed blames the slack for
+  for (const std::size_t joint : {1u, 2u}) {
+    EXPECT_GT(slack[joint].overshoot, 0.04);
+    EXPECT_LT(slack[joint].overshoot, 0.12);
+    EXPECT_LT(slack[joint].settled, 0.75);
+  }
+  EXPECT_LT(tight[0].settled, 0.75);
 }
 
 }  // namespace

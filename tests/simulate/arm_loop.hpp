@@ -129,18 +129,19 @@ void show(const char* format, T... values) {
 }
 
 /// r of table 6.1 as the errata read it, or twice that; friction as a share of the torque of 2 kg/cm²; share of table 6.2's
-/// outer gains; T_C of the valves.
+/// outer gains; T_C of the valves; how many times table 6.1's D the joints truly have.
 struct Arm {
   const char* name = "";
-  double radius = 1, friction = 0, gains = 1, lag = 0.17;
+  double radius = 1, friction = 0, gains = 1, lag = 0.17, damping = 1;
 };
 inline constexpr Arm kDiameter{"diameter", 1, 0.01, 0.25}, kRadius{"radius", 2, 0.01, 1},
-    kRubbing{"radius, rubbing", 2, 0.03, 1};
+    kRubbing{"radius, rubbing", 2, 0.03, 1}, kDamped{"radius, damped", 2, 0.003, 1, 0.17, 11};
 
 inline double full_torque(const simulate::ArmJointConfig& joint) {
   return joint.muscle.B * joint.wheel_radius * 2 * kPascalPerKgfCm2;
 }
 
+/// As the controller believes it to be.
 inline simulate::ArmPlantConfig build(const Arm& arm) {
   simulate::ArmPlantConfig config = soft_arm_config();
   for (simulate::ArmJointConfig& joint : config.joints) {
@@ -148,6 +149,13 @@ inline simulate::ArmPlantConfig build(const Arm& arm) {
     joint.friction = arm.friction * full_torque(joint);
     for (simulate::ValveUnit& valve : joint.valve) valve.fill_lag = valve.vent_lag = arm.lag;
   }
+  return config;
+}
+
+/// As it is: with the damping that the controller's model does not know.
+inline simulate::ArmPlantConfig true_arm(const Arm& arm) {
+  simulate::ArmPlantConfig config = build(arm);
+  for (simulate::ArmJointConfig& joint : config.joints) joint.muscle.D *= arm.damping;
   return config;
 }
 
