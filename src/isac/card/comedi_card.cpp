@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <cmath>
-#include <ctime>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "isac/card/comedi_clock.hpp"
 #include "isac/core/error.hpp"
 
 namespace isac::card {
@@ -20,29 +19,6 @@ namespace {
 using Kind = SignalLine::Kind;
 
 constexpr std::uint32_t kLargestModulus = 1u << 31;
-
-class SystemClock final : public ComediClock {
- public:
-  SystemClock() { clock_gettime(CLOCK_MONOTONIC, &began_); }
-  [[nodiscard]] std::int64_t now_ns() const noexcept override {
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (now.tv_sec - began_.tv_sec) * kSecond + (now.tv_nsec - began_.tv_nsec);
-  }
-  void sleep_until(std::int64_t time_ns) noexcept override {
-    if (time_ns <= now_ns()) return;
-    const std::int64_t total = began_.tv_nsec + time_ns;
-    timespec until{};
-    until.tv_sec = began_.tv_sec + total / kSecond;
-    until.tv_nsec = total % kSecond;
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
-    }
-  }
-
- private:
-  static constexpr std::int64_t kSecond = 1'000'000'000;
-  timespec began_{};
-};
 
 struct Device {
   std::string path;
@@ -79,7 +55,7 @@ unsigned aref_of(SignalLine::Reference reference) noexcept {
 class ComediCard final : public Card {
  public:
   ComediCard(const SignalTable& table, std::unique_ptr<ComediClock> clock)
-      : table_(table), clock_(clock ? std::move(clock) : std::make_unique<SystemClock>()) {
+      : table_(table), clock_(clock ? std::move(clock) : system_clock()) {
     comedi_set_global_oor_behavior(COMEDI_OOR_NUMBER);
     try {
       open_devices();

@@ -19,21 +19,13 @@
 /// E.1.4; comedi(7). Where the program was built without libcomedi, opening says so.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 
 #include "isac/card/card.hpp"
+#include "isac/card/comedi_clock.hpp"
 #include "isac/card/signal_table.hpp"
 
 namespace isac::card {
-
-/// The time that a Comedi card lives in; a test may bring its own.
-class ComediClock {
- public:
-  virtual ~ComediClock() = default;
-  [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
-  virtual void sleep_until(std::int64_t time_ns) noexcept = 0;
-};
 
 /// `clock` null: the system's. No person is at such a card.
 [[nodiscard]] Opened open_comedi(const SignalTable& table, std::unique_ptr<ComediClock> clock = nullptr);
