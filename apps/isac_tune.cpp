@@ -98,6 +98,7 @@ struct Found {
   std::optional<tune::PlantFit> fit;
   tune::DescribingFunction describing;
   apps::RigRunOutcome run;
+  tune::ExperimentRecord record;  ///< of an experiment that failed
   std::string refusal;
 };
 
@@ -122,6 +123,7 @@ Found excite(const Words& w, const record::Rig& rig) {
   found.run = apps::run_on_rig(run, *experiment);
   if (experiment->state() == tune::Experiment::State::kFailed) {
     found.refusal = "the " + w.method + " failed: " + experiment->failure();
+    found.record = experiment->record();
     return found;
   }
   tune::PlantFitOptions options;
@@ -191,17 +193,21 @@ void print_summary(std::FILE* out, const Words& w, const apps::TuneAnswer& a) {
   if (a.fit != nullptr) {
     for (const auto* list : {&a.fit->parameters, &a.fit->derived})
       for (const Estimated& e : *list)
-        fmt::print(out, "  {:<10} {:>10.4g} +- {:<8.2g} {}\n", e.name, e.value, e.std_error, e.unit);
+        if (std::isfinite(e.std_error))
+          fmt::print(out, "  {:<10} {:>10.4g} +- {:<8.2g} {}\n", e.name, e.value, e.std_error, e.unit);
+        else
+          fmt::print(out, "  {:<10} {:>10.4g} (error not known) {}\n", e.name, e.value, e.unit);
   }
   if (a.tuning != nullptr) {
     const auto row = [&](const tune::Candidate& c) {
       if (c.figures.draws == 0) return;
       const tune::Assessment& f = c.figures;
       fmt::print(out,
-                 "  {:<30} tracking {:>7.1f} mrad  overshoot {:>6.1f} %  modulus margin {:.2f}  stable "
-                 "{:>5.1f} %  within limits {:>5.1f} %\n",
-                 c.name, 1e3 * f.tracking, 100 * f.overshoot_p95, f.modulus_p05, 100 * f.stable_share,
-                 100 * f.good_share);
+                 "  {:<30} tracking {:>7.1f} mrad  overshoot {:>6.1f} %  modulus margin {:.2f}  effort "
+                 "{:>5.1f} kg/cm2/s  "
+                 "stable {:>5.1f} %  within limits {:>5.1f} %\n",
+                 c.name, 1e3 * f.tracking, 100 * f.overshoot_p95, f.modulus_p05, f.effort / kPascalPerKgfCm2,
+                 100 * f.stable_share, 100 * f.good_share);
     };
     if (a.tuning->before) row(*a.tuning->before);
     for (const tune::Candidate& c : a.tuning->candidates) row(c);
@@ -276,13 +282,17 @@ int tune_gains(Words words) {
     deploy(words, *joint, tuning->candidates[*tuning->chosen].gains);
     answer.deployed = words.output;
   }
-  if (!words.report.empty() && tuning) {
+  if (!words.report.empty()) {  // what was done is drawn, however it ended
     report::TuneReportInput input;
     input.head.rig = rig.name;
     input.head.created = now_iso8601();
-    input.model = &joint->model;
-    input.tuning = &*tuning;
+    if (tuning) {
+      input.model = &joint->model;
+      input.tuning = &*tuning;
+    }
+    input.refusal = answer.refusal;
     input.fit = answer.fit;
+    input.record = found.record;
     input.limits = limits;
     input.experiment = words.method == "ramp"   ? "gain ramp"
                        : words.method == "step" ? "series of steps"

@@ -43,11 +43,12 @@ void print(const Row& row, const Assessment& a, const char* kind) {
   const Gains& g = row.gains;
   const double unit = g.structure == control::Structure::kPid ? kKg : 1.0;
   std::printf(
-      "| %s | %s | %.3g, %.3g, %.3g; %.3g, %.3g | %.1f | %.1f | %.1f | %.1f | %.2f | %.2f | %.0f | %.0f |\n",
+      "| %s | %s | %.3g, %.3g, %.3g; %.3g, %.3g | %.1f | %.1f | %.1f | %.1f | %.2f | %.2f | %.1f | %.0f | "
+      "%.0f |\n",
       row.name.c_str(), kind, g.position.proportional / unit, g.position.integral / unit,
       g.position.derivative / unit, g.torque.proportional / kKg, g.torque.integral / kKg, 1e3 * a.tracking,
       1e3 * a.tracking_p95, 100 * a.overshoot, 100 * a.overshoot_p95, a.settling, a.modulus_p05,
-      100 * a.stable_share, 100 * a.good_share);
+      a.effort / kKg, 100 * a.stable_share, 100 * a.good_share);
 }
 
 TEST(Comparison, optimised_gains_track_better_than_every_rule_at_the_same_robustness) {
@@ -89,7 +90,7 @@ TEST(Comparison, optimised_gains_track_better_than_every_rule_at_the_same_robust
                             {"optimised PI-PI", pipi.gains, {}, {}}};
   std::printf(
       "| gains | | K_P, K_I, K_D; inner K_P, K_I | tracking | 95 %% | overshoot | 95 %% | settling | modulus "
-      "5 %% | stable | within |\n");
+      "5 %% | effort | stable | within |\n");
   for (Row& row : found) {
     row.as_is = assess(model, draws, row.gains, limits);
     print(row, row.as_is, "as is");

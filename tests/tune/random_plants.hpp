@@ -47,6 +47,51 @@ struct KnownPlant {
   }
 };
 
+/// Latency and adjustment time of a unit step by the tangent at its steepest point, on a finely simulated answer.
+struct KnownTangent {
+  double latency = 0, adjustment = 0;
+};
+inline KnownTangent tangent_of(const KnownPlant& plant) {
+  double least = plant.time_constant > 0 ? plant.time_constant : 1.0;
+  for (const double t : plant.lags) least = std::min(least, t);
+  const double h = 2e-3 * least, w = plant.time_constant > 0 ? 1 / plant.time_constant : 0;
+  std::vector<double> lag(plant.lags.size(), 0.0);
+  double angle = 0, speed = 0, last = 0, before = 0;
+  KnownTangent best;
+  double steepest = 0;
+  for (int k = 1; k < 2000000; ++k) {
+    double x = 1;
+    for (std::size_t i = 0; i < lag.size(); ++i) {
+      const double old = lag[i];
+      lag[i] = x + (lag[i] - x) * std::exp(-h / plant.lags[i]);
+      const double share = i == 0 ? plant.lead / plant.lags[0] : 0.0;
+      x = share * x + (1 - share) * 0.5 * (old + lag[i]);
+    }
+    if (w > 0) {
+      const auto pull = [&](double a, double v) { return w * w * (x - a) - 2 * plant.damping * w * v; };
+      const double k1 = pull(angle, speed), k2 = pull(angle + h / 2 * speed, speed + h / 2 * k1);
+      const double k3 = pull(angle + h / 2 * (speed + h / 2 * k1), speed + h / 2 * k2);
+      const double k4 = pull(angle + h * (speed + h / 2 * k2), speed + h * k3);
+      angle += h * (speed + h / 6 * (k1 + k2 + k3));
+      speed += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+    } else {
+      angle = lag.back();
+      speed = (angle - before) / h;
+    }
+    before = angle;
+    if (speed > steepest) {
+      steepest = speed;
+      const double t = (k - (w > 0 ? 0.0 : 0.5)) * h;
+      const double y = w > 0 ? angle : angle - 0.5 * h * speed;
+      best = {plant.dead_time + t - y / speed, 1 / speed};
+    } else if (speed < 0.5 * last && k * h > 20 * least) {
+      break;
+    }
+    last = steepest;
+  }
+  return best;
+}
+
 /// Plays an experiment on a plant; returns it finished. Ticks tremble by a share of the interval.
 inline void play(tune::Experiment& experiment, const KnownPlant& plant, double interval,
                  simulate::Random& random) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <iostream>
 
@@ -19,11 +20,15 @@ using test::KnownPlant;
 constexpr double kInterval = 0.001, kKg = kPascalPerKgfCm2;
 constexpr int kPlants = 200;
 
+/// What is asked for of every plant; its truth comes from random_plants.hpp.
+constexpr std::array<const char*, 4> kAsked = {"K_crit", "T_crit", "T_L", "T_A"};
+
 struct Score {
   int within = 0, wrong = 0, refused = 0;
   double worst = 0;
-  int covered = 0, used = 0;
-  double describing_low = 0, describing_high = 0;
+  std::array<int, kAsked.size()> covered{};
+
+  [[nodiscard]] int answers() const { return within + wrong; }
 };
 
 /// Draws the plant, lets `run` excite it, compares.
@@ -34,29 +39,34 @@ Score score_of(std::uint64_t seed, Run run) {
     simulate::Random random(seed + static_cast<std::uint64_t>(i), 1);
     KnownPlant plant = test::random_plant(random, i % 5 < 3 ? 0 : i % 5 - 2);
     const double w = plant.critical(), gain = 1 / plant.size(w), period = 2 * M_PI / w;
+    const test::KnownTangent tangent = test::tangent_of(plant);
     const PlantFit fit = run(plant, gain, period, random);
     if (!fit.refusal.empty()) {
       ++score.refused;
-      if (std::getenv("ISAC_TUNE_VERBOSE")) std::cout << i << " refused: " << fit.refusal << "\n";
       continue;
     }
-    const Estimated &k = value_of(fit, "K_crit"), &t = value_of(fit, "T_crit");
-    const double off = std::max(std::abs(k.value * kKg / gain - 1), std::abs(t.value / period - 1));
+    const std::array<double, kAsked.size()> truth = {gain / kKg, period, tangent.latency, tangent.adjustment};
+    double off = 0;
+    for (std::size_t k = 0; k < kAsked.size(); ++k) {
+      const Estimated& e = value_of(fit, kAsked[k]);
+      score.covered[k] += e.ci_low <= truth[k] && truth[k] <= e.ci_high ? 1 : 0;
+      if (k < 2) off = std::max(off, std::abs(e.value / truth[k] - 1));
+    }
     ++(off <= 0.05 ? score.within : score.wrong);
     score.worst = std::max(score.worst, off);
-    if (i % 5 < 3) {
-      ++score.used;
-      score.covered += k.ci_low * kKg <= gain && gain <= k.ci_high * kKg ? 1 : 0;
-    }
-    if (std::getenv("ISAC_TUNE_VERBOSE"))
-      std::cout << i << " K " << k.value * kKg / gain << " +- " << k.std_error / k.value << " T "
-                << t.value / period << " misfit " << fit.misfit << "\n";
   }
   std::cout << "within 5 %: " << score.within << ", wrong: " << score.wrong << ", refused: " << score.refused
-            << ", worst " << score.worst
-            << ", 95 % intervals of K_crit that hold it (plants of the fitted order): " << score.covered
-            << "/" << score.used << "\n";
+            << ", worst " << score.worst << "; 95 % intervals that hold the truth:";
+  for (std::size_t k = 0; k < kAsked.size(); ++k)
+    std::cout << " " << kAsked[k] << " " << score.covered[k] << "/" << score.answers();
+  std::cout << "\n";
   return score;
+}
+
+/// Of 200 intervals that hold with 95 %, fewer than 92 % do once in 40 times; the seeds are fixed.
+void expect_honest_intervals(const Score& score) {
+  for (std::size_t k = 0; k < kAsked.size(); ++k)
+    EXPECT_GE(score.covered[k], 0.92 * score.answers()) << kAsked[k];
 }
 
 PlantFit failed(const Experiment& experiment) {
@@ -87,6 +97,7 @@ TEST(RandomPlants, relay_finds_gain_and_period_within_five_percent_or_refuses) {
   std::cout << "describing function over K_crit: " << low << " to " << high << "\n";
   EXPECT_GE(score.within, 0.95 * kPlants);
   EXPECT_EQ(score.wrong, 0);
+  expect_honest_intervals(score);
 }
 
 TEST(RandomPlants, gain_ramp_finds_gain_and_period_within_five_percent_or_refuses) {
@@ -109,10 +120,9 @@ TEST(RandomPlants, gain_ramp_finds_gain_and_period_within_five_percent_or_refuse
         }
         return fit;
       });
-  // A P loop that still damps well says little about plants of a higher order than is fitted: one answer in twenty may be wrong.
-  EXPECT_LE(score.wrong, 0.05 * (score.within + score.wrong));
-  EXPECT_LE(score.worst, 0.15);
-  EXPECT_GE(score.within, 0.8 * kPlants);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_GE(score.within, 0.8 * kPlants);  // the rest is refused: the growth of the swings says otherwise
+  expect_honest_intervals(score);
 }
 
 TEST(RandomPlants, steps_find_gain_and_period_within_five_percent_or_refuse) {
@@ -127,9 +137,9 @@ TEST(RandomPlants, steps_find_gain_and_period_within_five_percent_or_refuse) {
     if (steps.state() != Experiment::State::kDone) return failed(steps);
     return fit_plant(steps.excited(), {.time_scale = period, .noise = steps.noise()});
   });
-  EXPECT_GE(score.within, 0.95 * kPlants);
-  EXPECT_LE(score.wrong, 0.02 * kPlants);  // plants of a higher order than is fitted, see docs/tuning.md
-  EXPECT_LE(score.worst, 0.10);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_GE(score.within, 0.9 * kPlants);  // the rest is refused: not known well enough
+  expect_honest_intervals(score);
 }
 
 }  // namespace

@@ -192,7 +192,7 @@ void send_ticks(Gnuplot& gnuplot, char axis, const Axis& description, Range rang
                 double per_tick, bool labelled) {
   if (description.log) {
     gnuplot << "set logscale " << axis << "\nset " << axis << "tics autofreq\nset format " << axis
-            << " '%g'\n";
+            << (labelled ? " '%g'\n" : " ''\n");
     return;
   }
   gnuplot << "unset logscale " << axis << "\n";

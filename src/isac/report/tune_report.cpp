@@ -20,29 +20,44 @@ using tune::Candidate;
 constexpr double kDegreesPerRadian = 180 / kPi;
 
 const Candidate* chosen_of(const TuneReportInput& input) {
-  return input.tuning->chosen ? &input.tuning->candidates[*input.tuning->chosen] : nullptr;
+  return input.tuning != nullptr && input.tuning->chosen ? &input.tuning->candidates[*input.tuning->chosen]
+                                                         : nullptr;
 }
 
+/// The record and, where a plant could be fitted, the plant and what is left over.
 Figure experiment_figure(const TuneReportInput& input) {
-  const tune::PlantFit& fit = *input.fit;
-  Figure figure{
-      .id = "tune-experiment",
-      .alt = "Angle and command during the experiment",
-      .caption =
-          "The " + input.experiment +
-          ": angle as measured (wide, grey) and of the fitted plant, and the command; the plant leaves " +
-          number(100 * fit.misfit, 2) + " % of the motion beyond the noise at rest.",
-      .shared_x = true};
+  const bool fitted = input.fit != nullptr && !input.fit->predicted.empty();
+  const tune::ExperimentRecord& record = fitted ? input.fit->record : input.record;
+  std::string caption = "The " + input.experiment + ": angle as measured and the command.";
+  if (fitted)
+    caption = "The " + input.experiment +
+              ": angle as measured (wide, grey) and of the fitted plant, what is left between them, and the "
+              "command; the plant leaves " +
+              number(100 * input.fit->misfit, 2) + " % of the motion beyond the noise at rest.";
+  Figure figure{.id = "tune-experiment",
+                .alt = "Angle and command during the experiment",
+                .caption = std::move(caption),
+                .shared_x = true};
   const Axis time{.label = "Time", .unit = "s", .tight = true};
   Panel angle{.x = time, .y = {.label = "Angle φ", .unit = "rad"}};
-  Curve measured = line("measured", colour::kUnderlay, fit.record.time, fit.record.angle);
+  Curve measured = line("measured", colour::kUnderlay, record.time, record.angle);
   measured.size = 3;
-  angle.curves = {std::move(measured), line("fitted plant", colour::kModel, fit.record.time, fit.predicted)};
-  std::vector<double> command = fit.record.command;
+  angle.curves = {std::move(measured)};
+  if (fitted) angle.curves.push_back(line("fitted plant", colour::kModel, record.time, input.fit->predicted));
+  figure.panels = {std::move(angle)};
+  if (fitted) {
+    std::vector<double> left = record.angle;
+    for (std::size_t k = 0; k < left.size(); ++k) left[k] = 1e3 * (left[k] - input.fit->predicted[k]);
+    Panel residual{.x = time, .y = {.label = "Left", .unit = "mrad"}, .height = 90};
+    residual.curves = {line("", colour::kMeasured, record.time, left)};
+    figure.panels.push_back(std::move(residual));
+  }
+  std::vector<double> command = record.command;
   for (double& u : command) u /= kPascalPerKgfCm2;
   Panel below{.x = time, .y = {.label = "Δp", .unit = "kg/cm²"}, .height = 90};
-  below.curves = {line("", colour::kSecond, fit.record.time, command)};
-  figure.panels = {std::move(angle), std::move(below)};
+  below.curves = {line("", colour::kSecond, record.time, command)};
+  below.curves[0].mark = Mark::kSteps;
+  figure.panels.push_back(std::move(below));
   return figure;
 }
 
@@ -144,19 +159,22 @@ std::string structure_name(const tune::Gains& g) {
 }
 
 void add_candidates(Document& page, const TuneReportInput& input) {
-  Table table{.caption = "Every rule on the same " +
-                         whole(static_cast<double>(input.tuning->candidates.front().figures.draws)) +
-                         " joints that the parameters allow. Tracking error: rms along the trajectory below, "
-                         "mean and 95 % quantile; overshoot and "
-                         "modulus margin: what the worse 5 % of the joints have.",
-              .columns = {{"Gains"},
-                          {"Loop"},
-                          {"Tracking (mrad)", true},
-                          {"95 % (mrad)", true},
-                          {"Overshoot (%)", true},
-                          {"Modulus margin", true},
-                          {"Stable (%)", true},
-                          {"Within limits (%)", true}}};
+  Table table{
+      .caption =
+          "Every rule on the same " +
+          whole(static_cast<double>(input.tuning->candidates.front().figures.draws)) +
+          " joints that the parameters allow. Tracking error: rms along the trajectory below, "
+          "mean and 95 % quantile; overshoot and "
+          "modulus margin: what the worse 5 % of the joints have; effort: rms of Δp's change per second.",
+      .columns = {{"Gains"},
+                  {"Loop"},
+                  {"Tracking (mrad)", true},
+                  {"95 % (mrad)", true},
+                  {"Overshoot (%)", true},
+                  {"Modulus margin", true},
+                  {"Effort (kg/cm² s)", true},
+                  {"Stable (%)", true},
+                  {"Within limits (%)", true}}};
   const auto add = [&](const Candidate& c) {
     const tune::Assessment& a = c.figures;
     if (a.draws == 0) return;
@@ -164,8 +182,8 @@ void add_candidates(Document& page, const TuneReportInput& input) {
     table.rows.push_back({c.name, structure_name(c.gains), lost ? "–" : fixed_decimals(1e3 * a.tracking, 1),
                           lost ? "–" : fixed_decimals(1e3 * a.tracking_p95, 1),
                           lost ? "–" : fixed_decimals(100 * a.overshoot_p95, 1),
-                          fixed_decimals(a.modulus_p05, 2), fixed_decimals(100 * a.stable_share, 1),
-                          fixed_decimals(100 * a.good_share, 1)});
+                          fixed_decimals(a.modulus_p05, 2), fixed_decimals(a.effort / kPascalPerKgfCm2, 1),
+                          fixed_decimals(100 * a.stable_share, 1), fixed_decimals(100 * a.good_share, 1)});
   };
   if (input.tuning->before) add(*input.tuning->before);
   for (std::size_t i = 0; i < input.tuning->candidates.size(); ++i) {
@@ -205,7 +223,7 @@ std::string render_tune_report(const TuneReportInput& input) {
   require_gnuplot();
   Document page = open_page(input.head, "Tuning of a joint");
   const Candidate* chosen = chosen_of(input);
-  const std::string& refusal = input.tuning->refusal;
+  const std::string& refusal = input.refusal;
   if (refusal.empty() && chosen != nullptr)
     page.box(BoxKind::kGood, "The gains hold their limits",
              {input.deployed.empty()
@@ -240,13 +258,16 @@ std::string render_tune_report(const TuneReportInput& input) {
     add_gains(page, input, *chosen);
     add_candidates(page, input);
   }
-  if (input.fit != nullptr) {
+  if (input.fit != nullptr && !input.fit->predicted.empty()) {
     page.heading("What the experiment found");
     page.equation({"φ/Δp = K e^(−L s) / ((1 + T_C s)(1 + 2 ζ T_J s + T_J² s²))"});
     add_parameters(page, input.fit->parameters, "The plant, with 95 % intervals.");
     add_parameters(page, input.fit->derived,
                    "What follows from it: ultimate gain and period, latency and adjustment time of the whole "
                    "and of the joint alone.");
+    page.add_figure(experiment_figure(input));
+  } else if (!input.record.time.empty()) {
+    page.heading("What the experiment saw");
     page.add_figure(experiment_figure(input));
   }
   if (chosen != nullptr) {

@@ -17,11 +17,13 @@ namespace isac::report {
 
 struct TuneReportInput {
   ReportHead head = {};
-  const tune::JointModel* model = nullptr;  ///< must not be null
-  const tune::Tuning* tuning = nullptr;     ///< must not be null
+  const tune::JointModel* model = nullptr;  ///< must not be null where `tuning` is not
+  const tune::Tuning* tuning = nullptr;     ///< null: it ended with the experiment
   const tune::PlantFit* fit = nullptr;      ///< null: no experiment was made
+  tune::ExperimentRecord record = {};       ///< of an experiment that failed: drawn where there is no fit
   tune::Limits limits = {};
   std::string experiment = {};  ///< "relay", "gain ramp", "steps"
+  std::string refusal = {};     ///< why the old gains stay; empty: new ones
   std::string deployed = {};    ///< file that holds the new gains; empty: none was written
   Warnings warnings = {};
 };

@@ -134,6 +134,7 @@ StepFigures step_figures(const Trace& trace, double height) {
     f.overshoot = std::max(f.overshoot, y - 1);
     if (y >= 0.9) f.rise = std::min(f.rise, t);
     if (std::abs(y - 1) > 0.05) f.settling = t;
+    f.rest = std::abs(y - 1);
     if (k > 0) f.itae += t * std::abs(height - trace.angle[k]) * (t - trace.time[k - 1]);
   }
   return f;

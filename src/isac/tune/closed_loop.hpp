@@ -45,6 +45,7 @@ struct StepFigures {
   double overshoot = 0;                                   ///< share of the step
   double rise = std::numeric_limits<double>::infinity();  ///< s
   double settling = 0;                                    ///< s
+  double rest = 0;                                        ///< share of the step that is missing at the end
   double itae = 0;                                        ///< rad s²
 };
 [[nodiscard]] StepFigures step_figures(const Trace& trace, double height);

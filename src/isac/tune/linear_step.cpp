@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unsupported/Eigen/MatrixFunctions>
 
 namespace isac::tune {
@@ -33,31 +34,47 @@ Step step_of(const Matrix4& system, double time) {
   return {e.topLeftCorner<3, 3>(), e.topRightCorner<3, 1>()};
 }
 
+/// Derivatives of a unit step's answer at a state, without the bend; `fourth` behind the step.
+struct Derivatives {
+  double first, second, third, fourth;
+};
+Derivatives derivatives_of(const LagPlant& p, const State& x) {
+  const double w = 1 / p.time_constant;
+  const double first = x[2], pressure_1 = (p.gain - x[0]) / p.lag, pressure_2 = -pressure_1 / p.lag;
+  const double second = w * w * (x[0] - x[1]) - 2 * p.damping * w * first;
+  const double third = w * w * (pressure_1 - first) - 2 * p.damping * w * second;
+  return {first, second, third, w * w * (pressure_2 - second) - 2 * p.damping * w * third};
+}
+
 /// Steepest point of a unit step's answer, found on the exact solution.
 models::StepShape<double> tangent_of(const LagPlant& plant) {
   const Matrix4 system = system_of(plant);
-  const auto at = [&system](double t) -> State { return step_of(system, t).gamma; };
+  const auto at = [&system, &plant](double t) { return derivatives_of(plant, step_of(system, t).gamma); };
   // The speed rises first and has its greatest value at its first maximum: later swings of a stable plant are smaller.
   const double fastest = std::min({plant.time_constant, plant.lag > 0 ? plant.lag : plant.time_constant});
   const double h = 0.05 * fastest;
   const Step one = step_of(system, h);
   State x = State::Zero();
-  double t = 0, last = 0;
+  double t = 0, last = -std::numeric_limits<double>::infinity();
+  bool rising = false;  // a bend lets the speed begin with a jump
   for (int i = 0; i < 200000; ++i, t += h) {
     x = (one.phi * x + one.gamma).eval();
-    if (!(x[2] > last)) break;
-    last = x[2];
+    const Derivatives d = derivatives_of(plant, x);
+    const double now = d.first + plant.bend * d.third;
+    if (rising && !(now > last)) break;
+    rising = now > last && i > 0;
+    last = now;
   }
   double low = std::max(0.0, t - h), high = t + h;
-  for (int i = 0; i < 60; ++i) {  // ÿ changes its sign at the steepest point
+  for (int i = 0; i < 60; ++i) {  // the speed stops growing at the steepest point
     const double middle = 0.5 * (low + high);
-    const State m = at(middle);
-    const double w = 1 / plant.time_constant;
-    (w * w * (m[0] - m[1]) - 2 * plant.damping * w * m[2] > 0 ? low : high) = middle;
+    const Derivatives d = at(middle);
+    (d.second + plant.bend * d.fourth > 0 ? low : high) = middle;
   }
-  const State steepest = at(0.5 * (low + high));
-  return {.latency = plant.dead_time + 0.5 * (low + high) - steepest[1] / steepest[2],
-          .adjustment = plant.gain / steepest[2]};
+  const State steepest = step_of(system, 0.5 * (low + high)).gamma;
+  const Derivatives d = derivatives_of(plant, steepest);
+  const double height = steepest[1] + plant.bend * d.second, slope = d.first + plant.bend * d.third;
+  return {.latency = plant.dead_time + 0.5 * (low + high) - height / slope, .adjustment = plant.gain / slope};
 }
 
 }  // namespace
@@ -78,9 +95,11 @@ void simulate_into(const LagPlant& plant, double interval, std::span<const doubl
     return command[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))] - command[0];
   };
   State x = State::Zero();
+  const double w = 1 / plant.time_constant, bend = plant.bend;
+  const State read(bend * w * w, 1 - bend * w * w, -2 * bend * plant.damping * w);  // φ + q φ̈
   angle.resize(command.size());
   for (std::size_t k = 0; k < command.size(); ++k) {
-    angle[k] = x[1];
+    angle[k] = read.dot(x);
     const auto now = static_cast<std::ptrdiff_t>(k) - whole;
     x = (phi * x + old_gain * delayed(now - 1) + new_gain * delayed(now)).eval();
   }

@@ -22,7 +22,7 @@ constexpr double kDelayTurn =
 Complex value_of(const DelayedPolynomial& p, const Complex& s) {
   Complex sum = 0;
   for (const double a : p.coefficients) sum = sum * s + a;
-  return p.delay > 0 ? sum * std::exp(-s * p.delay) : sum;
+  return p.delay != 0 ? sum * std::exp(-s * p.delay) : sum;
 }
 
 Complex sum_of(const std::vector<DelayedPolynomial>& terms, double omega) {
@@ -239,7 +239,9 @@ std::vector<double> multiply(const std::vector<double>& p, const std::vector<dou
 
 Loop plant_loop(const LagPlant& p) {
   const double t = p.time_constant;
-  return {.numerator = {{{p.gain}, p.dead_time}},
+  const std::vector<double> numerator =
+      p.bend != 0 ? std::vector<double>{p.gain * p.bend, 0.0, p.gain} : std::vector<double>{p.gain};
+  return {.numerator = {{numerator, p.dead_time}},
           .denominator = {{multiply({t * t, 2 * p.damping * t, 1.0}, {p.lag, 1.0})}}};
 }
 

@@ -12,9 +12,12 @@ namespace isac::tune {
 namespace {
 
 constexpr double kMostInnerUse = 0.5;  // of the sampled torque loop's border
+constexpr double kMostRest =
+    0.05;  // of a step, missing after two seconds: gains that never arrive track as well as others
 constexpr double kUnstable = 1e3;
 
-/// The gains that are searched for, as logarithms; an integral gain of 0 starts small.
+/// What is searched for, as logarithms: of a PID its gains; of a cascade the same, but of the position loop's K_I/K_P what it has
+/// beyond `least`, so that no gain can be found below it.
 std::vector<double*> members(Gains& g) {
   if (g.structure == control::Structure::kPid)
     return {&g.position.proportional, &g.position.integral, &g.position.derivative};
@@ -31,6 +34,8 @@ class Search {
     Gains g = form_;
     std::size_t i = 0;
     for (double* gain : members(g)) *gain = std::exp(x[i++]);
+    if (g.structure != control::Structure::kPid)
+      g.position.integral = g.position.proportional * (g.position.integral + options_.least_integral);
     return g;
   }
 
@@ -49,8 +54,6 @@ class Search {
           std::max(0.0, control::inner_loop_use(loop, options_.loop.sampling.interval) - kMostInnerUse);
       if (penalty > 0.2) return kUnstable * (1 + penalty);
     }
-    if (g.structure != control::Structure::kPid)
-      penalty += 0.2 * std::max(0.0, options_.least_integral - g.position.integral / g.position.proportional);
     // Margins first: they cost a hundredth of a simulation, and an unstable loop needs none.
     for (const JointModel& joint : joints_) {
       const Margins m = margins(control_loop(joint, g, options_.loop.sampling, model_));
@@ -62,6 +65,7 @@ class Search {
       const TrackingFigures t = tracking_figures(run_trajectory(model_, joint, g, options_.loop));
       if (!s.bounded || !t.bounded) return kUnstable;
       penalty += std::max(0.0, s.overshoot - options_.limits.overshoot * (1 - options_.spare));
+      penalty += std::max(0.0, s.rest - kMostRest);
       sum += t.rms + options_.itae_weight * s.itae + options_.effort_weight * t.effort;
     }
     const double n = static_cast<double>(joints_.size());
@@ -116,11 +120,14 @@ class Search {
 };
 
 /// A gain that is zero begins at a hundredth of its loop's proportional one (per second, seconds).
-std::vector<double> logarithms(Gains gains) {
+std::vector<double> logarithms(Gains gains, double least_integral) {
   std::vector<double> x;
   for (control::PidGains<double>* loop : {&gains.position, &gains.torque})
     for (double* k : {&loop->integral, &loop->derivative})
       if (!(*k > 0)) *k = 0.01 * loop->proportional;
+  if (gains.structure != control::Structure::kPid)
+    gains.position.integral =
+        std::max(0.01, gains.position.integral / gains.position.proportional - least_integral);
   for (const double* gain : members(gains)) x.push_back(std::log(*gain));
   return x;
 }
@@ -161,7 +168,8 @@ Optimised optimise(const JointModel& model, std::span<const JointModel> draws,
   out.gains = starts.front();
   const JointModel nominal[] = {model};
   Search first(model, nominal, starts.front(), options);
-  for (const Gains& start : starts) first.run(logarithms(start), options.nominal_evaluations);
+  for (const Gains& start : starts)
+    first.run(logarithms(start, options.least_integral), options.nominal_evaluations);
   out.evaluations = first.evaluations();
   if (first.best_x().empty()) return out;
   out.gains = first.gains_of(first.best_x().data());
@@ -178,7 +186,7 @@ Optimised optimise(const JointModel& model, std::span<const JointModel> draws,
     critical.push_back(draws[judged.overshooting]);
     if (judged.fragile != judged.overshooting) critical.push_back(draws[judged.fragile]);
     Search search(model, critical, starts.front(), options);
-    search.run(logarithms(out.gains), options.round_evaluations);
+    search.run(logarithms(out.gains, options.least_integral), options.round_evaluations);
     out.evaluations += search.evaluations();
     if (search.best_x().empty()) break;
     out.gains = search.gains_of(search.best_x().data());

@@ -2,7 +2,8 @@
 /// All gains of a controller by search (NLopt): least tracking error over draws of the joint, with limits that most draws keep.
 ///
 ///   minimise  E_draws[rms tracking error + w_s · ITAE of the step + w_e · effort]
-///   such that on 95 % of the draws  overshoot ≤ limit,  min |1 + L| ≥ modulus,  stable,  inner use ≤ 0.5,  K_I ≥ K_P/10 s outside
+///   such that on 95 % of the draws  overshoot ≤ limit,  min |1 + L| ≥ modulus,  stable,  inner use ≤ 0.5,  K_I ≥ K_P/10 s outside,
+///             a step has come within 5 % after 2 s
 /// Over the logarithms of the gains, by Subplex (Rowan; derivative-free) with the limits as penalties: first on the model alone from
 /// every start; then on the model and a few critical draws: all draws are judged, those at the 97 % quantile of overshoot and the 3 %
 /// quantile of the modulus margin join the set, and the search goes on, until enough draws hold. What comes out should be judged on other

@@ -3,6 +3,7 @@
 ///
 ///   Δp → φ:  G(s) = K e^(−L s) / ((1 + T_C s)(1 + 2 ζ T_J s + T_J² s²)),   K = K_C K_J          seed 4.1, 4.4 to 4.6
 ///
+/// (1 + q s²) behind it stands in for lags (q > 0) and leads (q < 0) that this form has not; only fits use it (plant_fit.hpp).
 /// The lag form holds near the middle (C = 0, no limits). It is what a step or a relay can tell without force sensors.
 /// Units: SI; K in rad/Pa. Real time: not for the loop. Threads: values. Errors: none here; lag_plant() returns a Status.
 /// Source: docs/derivations/tuning.md. Example: `LagPlant g; if (ok(lag_plant(joint, g))) …`
@@ -45,6 +46,7 @@ struct LagPlant {
   double time_constant = 0;  ///< s, T_J
   double damping = 0;        ///< -, ζ
   double dead_time = 0;      ///< s, L
+  double bend = 0;           ///< s², q of (1 + q s²), of either sign; a joint model has none
 };
 
 /// kOutOfRange where A r² ≥ 0 or the inertia is not positive.

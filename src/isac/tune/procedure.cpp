@@ -10,18 +10,20 @@ namespace {
 
 constexpr double kInnerUse = 0.4;
 constexpr double kOvershoot = 0.10;
+constexpr double kOvershootOfP = 0.05;  // half is left to the I part
+constexpr double kMostIntegral = 2;     // 1/s, K_I/K_P of the position loop: the greatest of the seed's (5.3)
 
 double overshoot_of(const JointModel& joint, const Gains& gains, const ClosedLoopOptions& options) {
   const StepFigures f = step_figures(run_step(joint, joint, gains, options), kStepHeight);
   return f.bounded ? f.overshoot : 10.0;
 }
 
-/// The greatest gain in [low, high] with at most 10 % of overshoot, which grows with it.
-double largest(double low, double high, const std::function<double(double)>& overshoot) {
-  if (overshoot(high) <= kOvershoot) return high;
+/// The greatest gain in [low, high] with at most `limit` of overshoot, which grows with it.
+double largest(double low, double high, double limit, const std::function<double(double)>& overshoot) {
+  if (overshoot(high) <= limit) return high;
   for (int i = 0; i < 14; ++i) {
     const double middle = 0.5 * (low + high);
-    (overshoot(middle) > kOvershoot ? high : low) = middle;
+    (overshoot(middle) > limit ? high : low) = middle;
   }
   return low;
 }
@@ -60,9 +62,10 @@ std::optional<Gains> tune_by_procedure(const JointModel& joint, const ClosedLoop
     g.position = {.proportional = p, .integral = i};
     return g;
   };
-  const double p =
-      largest(0.0, 0.5 * critical->gain, [&](double k) { return overshoot_of(joint, with(k, 0), options); });
-  const double i = largest(0.0, 10 * p, [&](double k) { return overshoot_of(joint, with(p, k), options); });
+  const double p = largest(0.0, 0.5 * critical->gain, kOvershootOfP,
+                           [&](double k) { return overshoot_of(joint, with(k, 0), options); });
+  const double i = largest(0.0, kMostIntegral * p, kOvershoot,
+                           [&](double k) { return overshoot_of(joint, with(p, k), options); });
   return with(p, i);
 }
 
