@@ -129,10 +129,11 @@ void show(const char* format, T... values) {
 }
 
 /// r of table 6.1 as the errata read it, or twice that; friction as a share of the torque of 2 kg/cm²; share of table 6.2's
-/// outer gains; T_C of the valves; how many times table 6.1's D the joints truly have.
+/// outer gains; T_C of the valves; how many times table 6.1's D the joints truly have, and the
+/// controller's model.
 struct Arm {
   const char* name = "";
-  double radius = 1, friction = 0, gains = 1, lag = 0.17, damping = 1;
+  double radius = 1, friction = 0, gains = 1, lag = 0.17, damping = 1, known = 1;
 };
 inline constexpr Arm kDiameter{"diameter", 1, 0.01, 0.25}, kRadius{"radius", 2, 0.01, 1},
     kRubbing{"radius, rubbing", 2, 0.03, 1}, kDamped{"radius, damped", 2, 0.003, 1, 0.17, 11};
@@ -169,6 +170,8 @@ inline ArmLoop loop_of(const simulate::ArmPlantConfig& truth, const Arm& arm,
   for (auto& joint : loop.settings) {
     joint.position.proportional *= arm.gains;
     joint.position.integral *= arm.gains;
+    joint.muscle.C *= arm.known;
+    joint.muscle.D *= arm.known;
   }
   return loop;
 }
