@@ -183,6 +183,8 @@ TEST_F(Folder, points_are_followed_straight_from_one_to_the_next) {
     EXPECT_TRUE(director.at({.control_time = time, .phase = runtime::Phase::kControl, .angle = {}}, wanted));
     return wanted.joint[0].angle;
   };
+  EXPECT_TRUE(
+      director.at({.phase = runtime::Phase::kRunUp, .angle = {0.2}}, wanted));  // found where they begin
   EXPECT_NEAR(angle_at(0.0), 0.2, 1e-15);
   EXPECT_NEAR(angle_at(0.25), 0.25, 1e-15);
   EXPECT_NEAR(wanted.joint[0].velocity, 0.2, 1e-15);
@@ -192,6 +194,31 @@ TEST_F(Folder, points_are_followed_straight_from_one_to_the_next) {
   EXPECT_NEAR(angle_at(9.0), 0.0, 1e-15);
   EXPECT_EQ(wanted.joint[0].velocity, 0.0);
   EXPECT_FALSE(director.at({.control_time = 10.0, .phase = runtime::Phase::kControl, .angle = {}}, wanted));
+}
+
+TEST_F(Folder, points_are_approached_smoothly_from_wherever_the_joint_was_found) {
+  runtime::Motion motion;
+  motion.kind = runtime::Motion::Kind::kPoints;
+  motion.points = runtime::read_points(write("p.csv", "time [s],angle [rad]\n0,0.2\n1,0.4\n"), limits());
+  motion.duration = 1;
+  const std::atomic<bool> permit{true};
+  runtime::MotionDirector director(motion, permit);
+  runtime::Wanted wanted;
+  EXPECT_TRUE(director.at({.phase = runtime::Phase::kRunUp, .angle = {-0.3}}, wanted));
+  // 0.5 rad at 0.5 rad/s at the fastest: 1.5 s. Then the points, and the end after their second.
+  double last = -0.3, fastest = 0;
+  for (int k = 0; k < 3000; ++k) {
+    ASSERT_TRUE(
+        director.at({.control_time = 5e-4 * k, .phase = runtime::Phase::kControl, .angle = {}}, wanted));
+    fastest = std::max(fastest, (wanted.joint[0].angle - last) / 5e-4);
+    EXPECT_GE(wanted.joint[0].angle, last);
+    last = wanted.joint[0].angle;
+  }
+  EXPECT_NEAR(fastest, 0.5, 1e-3);
+  EXPECT_NEAR(last, 0.2, 1e-6);
+  EXPECT_TRUE(director.at({.control_time = 2.0, .phase = runtime::Phase::kControl, .angle = {}}, wanted));
+  EXPECT_NEAR(wanted.joint[0].angle, 0.3, 1e-12);
+  EXPECT_FALSE(director.at({.control_time = 2.5, .phase = runtime::Phase::kControl, .angle = {}}, wanted));
 }
 
 TEST(MotionDirector, arms_only_with_permission_and_plausible_samples) {

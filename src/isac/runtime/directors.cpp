@@ -87,8 +87,10 @@ JointAim MotionDirector::aim(double time) const noexcept {
   return {};
 }
 
-void MotionDirector::follow_points(double time, Wanted& wanted) noexcept {
+bool MotionDirector::follow_points(double time, Wanted& wanted) noexcept {
   const auto& points = motion_.points;
+  if (approach(points.front().angle, time, wanted)) return true;
+  if (time >= motion_.duration) return false;
   while (cursor_ + 2 < points.size() && points[cursor_ + 1].time <= time) ++cursor_;
   const MotionPoint& a = points[cursor_];
   const MotionPoint& b = points[cursor_ + 1];
@@ -97,29 +99,35 @@ void MotionDirector::follow_points(double time, Wanted& wanted) noexcept {
     wanted.joint[j] = {.angle = a.angle[j] + share * (b.angle[j] - a.angle[j]),
                        .velocity = time > b.time ? 0.0 : (b.angle[j] - a.angle[j]) / span};
   }
+  return true;
+}
+
+bool MotionDirector::approach(const PerJoint<double>& goal, double& time, Wanted& wanted) const noexcept {
+  double furthest = 0;
+  for (std::size_t j = 0; j < found_.size(); ++j)
+    furthest = std::max(furthest, std::abs(goal[j] - found_[j]));
+  // 3 u² − 2 u³ is steepest in its middle, 1.5 times the mean
+  const double takes = 1.5 * furthest / kApproachSpeed, u = time / takes;
+  if (!(time < takes)) {
+    time -= takes;
+    return false;
+  }
+  for (std::size_t j = 0; j < found_.size(); ++j) {
+    const double way = goal[j] - found_[j];
+    wanted.joint[j] = {.angle = found_[j] + way * u * u * (3 - 2 * u),
+                       .velocity = way * 6 * u * (1 - u) / takes,
+                       .acceleration = way * 6 * (1 - 2 * u) / (takes * takes)};
+  }
+  return true;
 }
 
 bool MotionDirector::follow_line(double time, Wanted& wanted) noexcept {
   const LinePath& path = *motion_.path;
-  double furthest = 0;
-  for (std::size_t j = 0; j < found_.size(); ++j)
-    furthest = std::max(furthest, std::abs(path.start()[j] - found_[j]));
-  // 3 u² − 2 u³ is steepest in its middle, 1.5 times the mean
-  const double approach = 1.5 * furthest / kApproachSpeed, along = time - approach - motion_.rest;
+  if (approach(path.start(), time, wanted)) return true;
+  const double along = time - motion_.rest;
   if (along >= path.duration() + motion_.duration) return false;
-  control::LinePoint<double> point;
-  if (time < approach) {
-    const double u = time / approach;
-    for (std::size_t j = 0; j < found_.size(); ++j) {
-      const double way = path.start()[j] - found_[j];
-      point.angle[j] = found_[j] + way * u * u * (3 - 2 * u);
-      point.velocity[j] = way * 6 * u * (1 - u) / approach;
-      point.acceleration[j] = way * 6 * (1 - 2 * u) / (approach * approach);
-    }
-  } else {
-    point = path.at(along);
-  }
-  for (std::size_t j = 0; j < found_.size(); ++j) {
+  const control::LinePoint<double> point = path.at(along);
+  for (std::size_t j = 0; j < wanted.joint.size(); ++j) {
     wanted.joint[j] = {
         .angle = point.angle[j], .velocity = point.velocity[j], .acceleration = point.acceleration[j]};
   }
@@ -136,15 +144,11 @@ bool MotionDirector::at(const Moment& now, Wanted& wanted) noexcept {
   }
   if (now.phase == Phase::kChecking) return true;
   wanted.arm = true;
-  if (now.phase == Phase::kVented) return true;
-  if (motion_.kind == Motion::Kind::kLine)
-    return now.phase != Phase::kControl || follow_line(now.control_time, wanted);
-  if (now.phase == Phase::kControl && now.control_time >= motion_.duration) return false;
-  if (motion_.kind == Motion::Kind::kPoints) {
-    if (now.phase == Phase::kControl) follow_points(now.control_time, wanted);
-  } else if (now.phase == Phase::kControl) {
-    wanted.joint[static_cast<std::size_t>(motion_.joint)] = aim(now.control_time);
-  }
+  if (now.phase != Phase::kControl) return true;
+  if (motion_.kind == Motion::Kind::kLine) return follow_line(now.control_time, wanted);
+  if (motion_.kind == Motion::Kind::kPoints) return follow_points(now.control_time, wanted);
+  if (now.control_time >= motion_.duration) return false;
+  wanted.joint[static_cast<std::size_t>(motion_.joint)] = aim(now.control_time);
   return true;
 }
 

@@ -5,7 +5,8 @@
 ///   sine   φ_d = amplitude sin(2π f t), with its speed and acceleration for the feed-forward
 ///   points φ_d straight between the rows of a CSV (angle, or phi1 … phi6), all checked before anything moves: within the
 ///          joints' limits, and no faster than their speed limit (seed 6.2 checks its trajectory likewise)
-///   line   the hand along straight pieces (line_path.hpp), after a smooth move of all joints to the start pose and a rest there
+///   line   the hand along straight pieces (line_path.hpp), after a rest at its start pose
+///          Before points and lines all joints go smoothly to where they begin, the longest way at 0.5 rad/s at most.
 ///   torque T_d constant; 0 is leading by hand (seed 6.3)
 /// The desired angle that the controller sees starts at the joint's own and runs to these no faster than its speed limit.
 ///
@@ -35,10 +36,10 @@ struct Motion {
   double size = 0;       ///< rad or N m: height, amplitude, torque
   double frequency = 0;  ///< Hz, of a sine
   double duration = 5;   ///< s under control
-  int joint = 0;         ///< the others hold 0 (rad, N m)
+  int joint = 0;         ///< the others hold the angle they were found at, or 0 N m
   std::vector<MotionPoint> points;
   std::shared_ptr<const LinePath> path{};  ///< of a line; its `duration` is what follows the end of the path
-  double rest = 2;                       ///< s at the start pose
+  double rest = 2;                         ///< s at the start pose
 };
 
 /// Rows of a CSV with `time` and `angle`, or `phi1` … of all joints. `limits` has one entry per joint.
@@ -54,9 +55,11 @@ class MotionDirector final : public Director {
 
  private:
   [[nodiscard]] JointAim aim(double time) const noexcept;
-  void follow_points(double time, Wanted& wanted) noexcept;
-  /// False: the path and its end are over.
+  /// False: over.
+  [[nodiscard]] bool follow_points(double time, Wanted& wanted) noexcept;
   [[nodiscard]] bool follow_line(double time, Wanted& wanted) noexcept;
+  /// True while the joints are still led to `goal`; then `time` is what has passed since they are there.
+  [[nodiscard]] bool approach(const PerJoint<double>& goal, double& time, Wanted& wanted) const noexcept;
 
   Motion motion_;
   const std::atomic<bool>& permit_;
