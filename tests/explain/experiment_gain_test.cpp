@@ -100,7 +100,7 @@ struct Said {
 
 Said ask(const TiedRig& rig, const std::vector<series::Recording>& runs) {
   Prepared data = prepare(runs, rig.facts(), {}, 4.0);
-  const Library library = make_library(data);
+  Library library = make_library(data);
   const Predictor predictor(data);
   ExplainOptions options;
   options.most_effects = 1;

@@ -392,8 +392,8 @@ std::optional<Tie> tie_of(const Predictor& predictor, const Library& library, co
     const Step& step = found.steps[s];
     Tie tie;
     const Hypothesis* added = &library.hypotheses[static_cast<std::size_t>(found.added[s])];
-    // The unit by which the search judged this step, and will judge it again: what is missing scatters in it too.
-    tie.noise_unit = step.screen.noise_unit;
+    // The unit by which the search ranked this step, and will rank it again with the planned run.
+    tie.noise_unit = step.trials.empty() ? step.screen.noise_unit : step.trials.front().behind.unit;
     for (const Trial& t : step.trials) {
       if (!t.in_set) continue;
       const Hypothesis* h = &library.hypotheses[static_cast<std::size_t>(t.hypothesis)];
