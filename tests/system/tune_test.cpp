@@ -124,12 +124,16 @@ TEST_F(Tune, gains_that_do_not_hold_their_limits_leave_the_file_as_it_was) {
 }
 
 TEST_F(Tune, a_relay_too_small_to_be_seen_is_refused_with_a_reason_and_the_gains_stay) {
-  const test::Run run =
-      tune({"--method", "relay", "--amplitude", "0.003 kg/cm2", "--longest", "10 s", "-o",
-            folder_ / "params.toml", "--json", folder_ / "answer.json", "--log", folder_ / "log.csv"});
+  const test::Run run = tune({"--method", "relay", "--amplitude", "0.003 kg/cm2", "--longest", "10 s", "-o",
+                              folder_ / "params.toml", "--json", folder_ / "answer.json", "--log",
+                              folder_ / "log.csv", "--report", folder_ / "report.html"});
   EXPECT_EQ(run.exit_code, 1) << run.out << run.err;
   EXPECT_EQ(answer()["verdict"], "kept");
   EXPECT_FALSE(answer()["reason"].get<std::string>().empty());
+  const std::string report =
+      test::read_text(folder_ / "report.html");  // what was tried is drawn all the same
+  EXPECT_NE(report.find("What the experiment saw"), std::string::npos);
+  EXPECT_NE(report.find("<svg"), std::string::npos);
   EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams);
   EXPECT_TRUE(fs::exists(folder_ / "log.csv"));
 }
@@ -147,37 +151,46 @@ TEST_F(Tune, a_safety_limit_vents_keeps_the_log_and_says_which) {
 }
 
 TEST_F(Tune, ctrl_c_in_the_middle_leaves_a_whole_log_and_the_old_gains) {
-  std::vector<std::string> owned = words(
-      {"--method", "step", "--pace", "real", "--log", folder_ / "log.csv", "-o", folder_ / "params.toml"});
-  owned[0] = std::string(ISAC_BIN_DIR) + "/isac-tune";
-  std::vector<char*> argv;
-  for (std::string& word : owned) argv.push_back(word.data());
-  argv.push_back(nullptr);
-  const std::string err = folder_ / "err";
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  for (const int stream : {0, 1}) posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
-  posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  pid_t child = 0;
-  ASSERT_EQ(posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ), 0);
-  posix_spawn_file_actions_destroy(&actions);
-  std::error_code none;
-  for (int i = 0; i < 3000; ++i) {
-    const auto size = fs::file_size(folder_ / "log.csv", none);
-    if (!none && size > 200000) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  // Bytes of the log after which it is stopped: the steps while they settle, the relay while the joint swings.
+  const struct {
+    const char* method;
+    std::uintmax_t bytes;
+  } cases[] = {{"step", 200000}, {"relay", 270000}};
+  for (const auto& c : cases) {
+    const std::string log = folder_ / (std::string(c.method) + ".csv");
+    std::vector<std::string> owned =
+        words({"--method", c.method, "--pace", "real", "--log", log, "-o", folder_ / "params.toml"});
+    owned[0] = std::string(ISAC_BIN_DIR) + "/isac-tune";
+    std::vector<char*> argv;
+    for (std::string& word : owned) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const std::string err = folder_ / "err";
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    for (const int stream : {0, 1})
+      posix_spawn_file_actions_addopen(&actions, stream, "/dev/null", O_RDWR, 0);
+    posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    pid_t child = 0;
+    ASSERT_EQ(posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ), 0);
+    posix_spawn_file_actions_destroy(&actions);
+    std::error_code none;
+    for (int i = 0; i < 3000; ++i) {
+      const auto size = fs::file_size(log, none);
+      if (!none && size > c.bytes) break;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    kill(child, SIGINT);
+    int status = 0;
+    waitpid(child, &status, 0);
+    ASSERT_TRUE(WIFEXITED(status)) << c.method;
+    EXPECT_EQ(WEXITSTATUS(status), 1) << c.method;
+    const std::string text = test::read_text(err);
+    EXPECT_NE(text.find("stopped by hand; the valves are vented"), std::string::npos) << text;
+    EXPECT_EQ(lines(text), 1) << text;
+    EXPECT_NE(test::read_text(log).find("# closed:"), std::string::npos) << c.method;
+    EXPECT_GT(record::read_recording(log).column("time").values.size(), 500u) << c.method;
+    EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams) << c.method;
   }
-  kill(child, SIGINT);
-  int status = 0;
-  waitpid(child, &status, 0);
-  ASSERT_TRUE(WIFEXITED(status));
-  EXPECT_EQ(WEXITSTATUS(status), 1);
-  const std::string text = test::read_text(err);
-  EXPECT_NE(text.find("stopped by hand"), std::string::npos) << text;
-  EXPECT_EQ(lines(text), 1);
-  EXPECT_NE(test::read_text(folder_ / "log.csv").find("# closed:"), std::string::npos);
-  EXPECT_GT(record::read_recording(folder_ / "log.csv").column("time").values.size(), 500u);
-  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams);
 }
 
 TEST_F(Tune, bad_calls_get_one_sentence_and_their_exit_code) {

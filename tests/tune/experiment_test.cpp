@@ -9,10 +9,12 @@
 #include "isac/simulate/random.hpp"
 #include "isac/tune/assess.hpp"
 #include "isac/tune/gain_ramp.hpp"
+#include "isac/tune/optimise.hpp"
 #include "isac/tune/plant_fit.hpp"
 #include "isac/tune/procedure.hpp"
 #include "isac/tune/relay.hpp"
 #include "isac/tune/step_series.hpp"
+#include "isac/tune/tuning.hpp"
 #include "random_plants.hpp"
 
 namespace isac::tune {
@@ -177,6 +179,32 @@ TEST(Draws, have_the_covariance_they_were_asked_for) {
   EXPECT_NEAR(std::sqrt(aa), 0.02, 0.001);  // 4000 draws know a deviation to 1.1 %
   EXPECT_NEAR(std::sqrt(bb), 0.04, 0.002);
   EXPECT_NEAR(ab / std::sqrt(aa * bb), 0.5, 0.05);
+}
+
+TEST(Tuning, a_search_that_a_person_stops_changes_nothing_and_says_so) {
+  Gains before;
+  before.position = {.proportional = 4, .integral = 8};
+  before.torque = {.proportional = 0.1 * kKg, .integral = 10 * kKg};
+  int asked = 0;
+  TuningOptions options{.draws = 4, .all_rules = false};
+  options.stop = [&asked] { return ++asked > 10; };
+  const Tuning tuning = tune_joint(testbed_model(), independent({}), before, options);
+  EXPECT_EQ(tuning.refusal, "the search was stopped by hand");
+  EXPECT_LE(tuning.evaluations, 10);
+  ASSERT_TRUE(tuning.before);
+  EXPECT_EQ(tuning.before->gains.position.integral, 8);
+}
+
+TEST(Search, never_tries_less_integral_than_it_was_told_and_its_gains_arrive) {
+  OptimiseOptions options{.nominal_evaluations = 40, .round_evaluations = 20, .rounds = 1};
+  options.least_integral = 0.3;
+  const JointModel model = testbed_model();
+  const auto start = tune_by_procedure(model);
+  ASSERT_TRUE(start);
+  const Optimised found = optimise(model, {}, {*start}, options);
+  ASSERT_TRUE(found.found);
+  EXPECT_GE(found.gains.position.integral, 0.3 * found.gains.position.proportional);
+  EXPECT_LE(step_figures(run_step(model, model, found.gains), kStepHeight).rest, 0.05);
 }
 
 TEST(Procedure, inner_gains_leave_the_sampled_loop_its_room_and_reach_a_torque_within_one_outer_interval) {

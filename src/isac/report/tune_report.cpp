@@ -39,17 +39,22 @@ Figure experiment_figure(const TuneReportInput& input) {
                 .caption = std::move(caption),
                 .shared_x = true};
   const Axis time{.label = "Time", .unit = "s", .tight = true};
-  Panel angle{.x = time, .y = {.label = "Angle φ", .unit = "rad"}};
-  Curve measured = line("measured", colour::kUnderlay, record.time, record.angle);
+  const auto in_mrad = [](std::vector<double> angle) {
+    for (double& a : angle) a *= 1e3;
+    return angle;
+  };
+  Panel angle{.x = time, .y = {.label = "Angle φ", .unit = "mrad"}};
+  Curve measured = line("measured", colour::kUnderlay, record.time, in_mrad(record.angle));
   measured.size = 3;
   angle.curves = {std::move(measured)};
-  if (fitted) angle.curves.push_back(line("fitted plant", colour::kModel, record.time, input.fit->predicted));
+  if (fitted)
+    angle.curves.push_back(line("fitted plant", colour::kModel, record.time, in_mrad(input.fit->predicted)));
   figure.panels = {std::move(angle)};
   if (fitted) {
     std::vector<double> left = record.angle;
-    for (std::size_t k = 0; k < left.size(); ++k) left[k] = 1e3 * (left[k] - input.fit->predicted[k]);
+    for (std::size_t k = 0; k < left.size(); ++k) left[k] -= input.fit->predicted[k];
     Panel residual{.x = time, .y = {.label = "Left", .unit = "mrad"}, .height = 90};
-    residual.curves = {line("", colour::kMeasured, record.time, left)};
+    residual.curves = {line("", colour::kMeasured, record.time, in_mrad(std::move(left)))};
     figure.panels.push_back(std::move(residual));
   }
   std::vector<double> command = record.command;
