@@ -228,13 +228,17 @@ TEST(Arm, one_joint_that_fails_is_named_and_vents_all) {
   ASSERT_EQ(arm.step(now, wanted, kDt, command, failed), Status::kOk);
   for (const auto& u : command) EXPECT_FALSE(u.vented);
 
-  arm.compensate = false;  // an angle that is no number would reach every joint through the compensation
   now[3].angle = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(arm.step(now, wanted, kDt, command, failed), Status::kNotFinite);
-  EXPECT_EQ(failed, 3);
-  for (const auto& u : command) {
-    EXPECT_TRUE(u.vented);
-    EXPECT_EQ(u.pressure.muscle_1, 0.0);
+  for (const bool compensated :
+       {true, false}) {  // also where it would reach every joint through the compensation
+    for (auto& joint : arm.joints) ASSERT_EQ(joint.set_mode(Mode::kHold), Status::kOk);
+    arm.compensate = compensated;
+    EXPECT_EQ(arm.step(now, wanted, kDt, command, failed), Status::kNotFinite);
+    EXPECT_EQ(failed, 3);
+    for (const auto& u : command) {
+      EXPECT_TRUE(u.vented);
+      EXPECT_EQ(u.pressure.muscle_1, 0.0);
+    }
   }
   now[3].angle = 0;
   ASSERT_EQ(arm.step(now, wanted, kDt, command, failed), Status::kOk);

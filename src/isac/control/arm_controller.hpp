@@ -59,7 +59,7 @@ class ArmController {
       const Status status = joints[i].step(now[i], reference, dt, command[i]);
       if (!ok(status)) {
         vent(command);
-        failed = static_cast<int>(i);
+        failed = static_cast<int>(compensate ? culprit(i, now, wanted) : i);
         return status;
       }
       delta_pressure_[i] = command[i].delta_pressure;
@@ -81,6 +81,14 @@ class ArmController {
             .reference_pressure = s.mean_pressure,
             .stiffness = s.muscle.A,
             .pressure_gain = s.muscle.B};
+  }
+
+  /// Through the compensation a value that is no number reaches every joint: whose was it? `noticed` if nobody's.
+  [[nodiscard]] static std::size_t culprit(std::size_t noticed, const PerJoint<JointMeasurement<S>>& now,
+                                           const PerJoint<ArmReference<S>>& wanted) noexcept {
+    for (std::size_t i = 0; i < kJoints; ++i)
+      if (!finite(now[i].angle, wanted[i].acceleration)) return i;
+    return noticed;
   }
 
   void vent(PerJoint<JointCommand<S>>& command) noexcept {
