@@ -20,7 +20,7 @@ using Verdict = PoseVerdict;
 #ifdef ISAC_MANY_SEEDS
 constexpr std::uint32_t kNone = 250, kEach = 20, kOther = 100;
 #else
-constexpr std::uint32_t kNone = 40, kEach = 3, kOther = 15;
+constexpr std::uint32_t kNone = 15, kEach = 1, kOther = 8;
 #endif
 
 struct Hidden {
