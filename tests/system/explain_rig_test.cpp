@@ -45,13 +45,16 @@ class ExplainOnTheRig : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(ExplainOnTheRig, names_nothing_where_nothing_is_hidden) {
-  log_first_afternoon("seed=5");
+class NothingHidden : public ExplainOnTheRig, public testing::WithParamInterface<int> {};
+
+/// Five recordings are few: the slow noise of the simulated amplifiers may leave "unknown", but it is given no name.
+TEST_P(NothingHidden, in_five_recordings_is_given_no_name) {
+  log_first_afternoon("seed=" + std::to_string(GetParam()));
   const json few = explain();
-  EXPECT_TRUE(few["verdict"] == "none" || few["verdict"] == "immaterial") << few["summary"];
-  EXPECT_TRUE(few["effects"].empty());
-  EXPECT_TRUE(few["alternatives"].empty());
+  EXPECT_TRUE(few["effects"].empty()) << few["summary"];
+  EXPECT_TRUE(few["alternatives"].empty()) << few["summary"];
 }
+INSTANTIATE_TEST_SUITE_P(Seeds, NothingHidden, testing::Values(1, 2, 5));
 
 TEST_F(ExplainOnTheRig, names_nothing_in_all_sweeps_of_a_rig_without_an_effect) {
   log("seed=2003", {"all"});
