@@ -125,8 +125,7 @@ TEST(RealTime, ten_thousand_ticks_of_the_whole_arm_ask_for_no_memory) {
   std::array<EncoderWatch<double>, 6> encoder;
   InputWatch input;
   std::uint8_t warnings = 0;
-  isac::test::allocations = 0;
-  isac::test::watched = true;
+  isac::test::watch_allocations();
   Status status = Status::kOk;
   for (int k = 0; k < 10000 && isac::ok(status); ++k) {
     const std::int64_t now = 500'000LL * (k + 1);
@@ -139,15 +138,14 @@ TEST(RealTime, ten_thousand_ticks_of_the_whole_arm_ask_for_no_memory) {
     machine.begin({.now = now, .sampled = now - 1000, .arm = k > 200, .finding = found});
     status = arm->tick(k);
   }
-  isac::test::watched = false;
+  const long allocations = isac::test::watched_allocations();
   EXPECT_EQ(status, Status::kOk);
   EXPECT_EQ(machine.state(), RunState::kArmed);
-  EXPECT_EQ(isac::test::allocations, 0);
+  EXPECT_EQ(allocations, 0);
   // The counter does count.
-  isac::test::watched = true;
+  isac::test::watch_allocations();
   ::operator delete(::operator new(8));  // called by name, it may not be optimised away
-  isac::test::watched = false;
-  EXPECT_EQ(isac::test::allocations, 1);
+  EXPECT_EQ(isac::test::watched_allocations(), 1);
 }
 
 TEST(RealTime, float_and_double_give_the_same_commands_to_float_precision) {

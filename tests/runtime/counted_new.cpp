@@ -5,8 +5,12 @@
 
 namespace isac::test {
 
+namespace {
+
 thread_local bool watched = false;
 thread_local long allocations = 0;
+
+}  // namespace
 
 void watch_allocations() noexcept {
   allocations = 0;

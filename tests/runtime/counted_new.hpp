@@ -4,9 +4,6 @@
 
 namespace isac::test {
 
-extern thread_local bool watched;
-extern thread_local long allocations;
-
 /// Begins to watch this thread, from 0.
 void watch_allocations() noexcept;
 /// Allocations since then; ends the watch.

@@ -99,21 +99,19 @@ TEST_F(Loop, brings_the_pressures_up_slowly_before_it_records) {
 
 TEST_F(Loop, allocates_nothing_while_it_records) {
   int ticks = 0;
-  card_->on_wait = [&ticks, this](test::FakeCard&) {
+  long allocations = -1;
+  card_->on_wait = [&ticks, &allocations, this](test::FakeCard&) {
     if (!live_.recording.load()) return;
     ++ticks;
-    if (ticks == 10) test::watched = true;
-    if (ticks == 1900) test::watched = false;
+    if (ticks == 10) test::watch_allocations();
+    if (ticks == 1900) allocations = test::watched_allocations();
   };
-  test::allocations = 0;
   EXPECT_EQ(play().end, LoopResult::End::kDone);
-  test::watched = false;
   EXPECT_GE(ticks, 1900);
-  EXPECT_EQ(test::allocations, 0);
-  test::watched = true;
+  EXPECT_EQ(allocations, 0);
+  test::watch_allocations();
   ::operator delete(::operator new(4));  // the counter counts
-  test::watched = false;
-  EXPECT_EQ(test::allocations, 1);
+  EXPECT_EQ(test::watched_allocations(), 1);
 }
 
 TEST_F(Loop, ends_at_a_limit_within_ten_milliseconds_and_says_which) {

@@ -80,6 +80,7 @@ void add_inertia(const models::PointMass<S>& point,
                  const std::array<models::Vec3<S>, static_cast<std::size_t>(N)>& place,
                  const models::JointVector<S, N>& acceleration, models::JointVector<S, N>& torque) noexcept {
   const auto link = static_cast<std::size_t>(point.link);
+  if (link >= turn.size()) return;  // hangs on no link of this chain
   models::Vec3<S> a;
   for (std::size_t j = 0; j <= link; ++j) {
     a = turn[j].to_child(a);
@@ -128,6 +129,7 @@ template <class S, int N>
   models::JointVector<S, N> torque{};
   for (std::size_t m = 0; m < static_cast<std::size_t>(chain.mass_count); ++m) {
     const models::PointMass<S>& point = chain.masses[m];
+    if (static_cast<std::size_t>(point.link) >= turn.size()) continue;  // hangs on no link of this chain
     models::Vec3<S> q = point.position;
     for (std::size_t j = static_cast<std::size_t>(point.link);; --j) {
       place[j] = q;
