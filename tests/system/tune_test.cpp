@@ -13,74 +13,24 @@
 #include "isac/core/units.hpp"
 #include "isac/record/csv_reader.hpp"
 #include "isac/record/tables.hpp"
-#include "run_program.hpp"
+#include "tune_folder.hpp"
 
 namespace isac {
 namespace {
 
+using test::kTuneParams;
+using Tune = test::TuneFolder;
 namespace fs = std::filesystem;
-
-constexpr const char* kRig = R"(format = "isac.rig/1"
-name = "testbed"
-
-[joint]
-chain_wheel_diameter = "38 mm"
-initial_pressure = "3.0 kg/cm2"
-inertia = "0.0085 kg m2"
-)";
-
-constexpr const char* kParams = R"(format = "isac.params/1"
-created = "2026-01-02T03:04:05Z"
-
-[[joint]]
-label = "testbed"
-constants = { wheel_radius_m = 0.019, initial_pressure_Pa = 294199.5, inertia_kg_m2 = 0.0085 }
-[joint.parameters]
-A = { value = -23450.0, unit = "N/m", std_error = 120 }
-B = { value = 174.2, unit = "N cm2/kg", std_error = 0.9 }
-C = { value = 0.0026, unit = "N m s3", std_error = 0.0003 }
-D = { value = 0.14, unit = "N m s", std_error = 0.003 }
-
-[pcu]
-[pcu.parameters]
-T_C = { value = 0.17, unit = "s", std_error = 0.001 }
-
-[gains]
-[gains.parameters]
-K_P_position = { value = 4.0, unit = "N m/rad" }
-K_I_position = { value = 8.0, unit = "N m/rad s" }
-K_P_torque = { value = 0.1, unit = "kgf/cm2/N m" }
-K_I_torque = { value = 10.0, unit = "kgf/cm2/N m s" }
-)";
-
-class Tune : public testing::Test {
- protected:
-  Tune() {
-    std::ofstream(folder_ / "rig.toml") << kRig;
-    std::ofstream(folder_ / "params.toml") << kParams;
-  }
-  [[nodiscard]] std::vector<std::string> words(const std::vector<std::string>& more) const {
-    std::vector<std::string> all = {"isac-tune", "--rig", folder_ / "rig.toml"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
-  }
-  [[nodiscard]] test::Run tune(const std::vector<std::string>& more) const {
-    return test::run_program(words(more));
-  }
-  [[nodiscard]] nlohmann::json answer() const {
-    return nlohmann::json::parse(test::read_text(folder_ / "answer.json"));
-  }
-  test::ScratchFolder folder_;
-};
 
 long lines(const std::string& text) {
   return std::count(text.begin(), text.end(), '\n');
 }
 
 TEST_F(Tune, relay_on_the_rig_ends_in_gains_that_a_controller_takes) {
-  const test::Run run = tune({"--method", "relay", "--card", "sim:seed=4", "-o", folder_ / "params.toml",
-                              "--log", folder_ / "relay.csv", "--report", folder_ / "tune.html", "--json",
-                              folder_ / "answer.json", "--draws", "60"});
+  const test::Run run =
+      tune({"--method", "relay", "--card", "sim:seed=4", "-o", folder_ / "params.toml", "--log",
+            folder_ / "relay.csv", "--report", folder_ / "tune.html", "--json", folder_ / "answer.json",
+            "--rule", "procedure", "--overshoot", "40", "--draws", "30"});
   ASSERT_EQ(run.exit_code, 0) << run.out << run.err;
   const auto a = answer();
   EXPECT_EQ(a["schema"], "isac.tune/1");
@@ -105,7 +55,7 @@ TEST_F(Tune, relay_on_the_rig_ends_in_gains_that_a_controller_takes) {
   EXPECT_NEAR(settings.torque.integral / kPascalPerKgfCm2, a["gains"]["K_I_torque"]["value"].get<double>(),
               1e-9);
   EXPECT_NE(settings.position.proportional, 4.0);
-  EXPECT_EQ(test::read_text(folder_ / "params.toml.bak"), kParams);
+  EXPECT_EQ(test::read_text(folder_ / "params.toml.bak"), kTuneParams);
   const std::string report = test::read_text(folder_ / "tune.html");
   for (const char* word : {"<svg", "What the experiment found", "Step before and after", "Margins"})
     EXPECT_NE(report.find(word), std::string::npos) << word;
@@ -115,7 +65,7 @@ TEST_F(Tune, gains_that_do_not_hold_their_limits_leave_the_file_as_it_was) {
   const test::Run run = tune({"--method", "model", "--rule", "ziegler-nichols", "-o", folder_ / "params.toml",
                               "--json", folder_ / "answer.json", "--draws", "40"});
   EXPECT_EQ(run.exit_code, 1) << run.out << run.err;
-  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams);
+  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kTuneParams);
   EXPECT_EQ(answer()["verdict"], "kept");
   EXPECT_NE(answer()["reason"].get<std::string>().find("overshoot"), std::string::npos);
   // P2 of the model stands in the answer all the same.
@@ -134,7 +84,7 @@ TEST_F(Tune, a_relay_too_small_to_be_seen_is_refused_with_a_reason_and_the_gains
       test::read_text(folder_ / "report.html");  // what was tried is drawn all the same
   EXPECT_NE(report.find("What the experiment saw"), std::string::npos);
   EXPECT_NE(report.find("<svg"), std::string::npos);
-  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams);
+  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kTuneParams);
   EXPECT_TRUE(fs::exists(folder_ / "log.csv"));
 }
 
@@ -147,7 +97,7 @@ TEST_F(Tune, a_safety_limit_vents_keeps_the_log_and_says_which) {
   EXPECT_NE(run.err.find("vented"), std::string::npos) << run.err;
   EXPECT_EQ(lines(run.err), 1);
   EXPECT_GT(record::read_recording(folder_ / "log.csv").column("time").values.size(), 1000u);
-  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams);
+  EXPECT_EQ(test::read_text(folder_ / "params.toml"), kTuneParams);
 }
 
 TEST_F(Tune, ctrl_c_in_the_middle_leaves_a_whole_log_and_the_old_gains) {
@@ -189,7 +139,7 @@ TEST_F(Tune, ctrl_c_in_the_middle_leaves_a_whole_log_and_the_old_gains) {
     EXPECT_EQ(lines(text), 1) << text;
     EXPECT_NE(test::read_text(log).find("# closed:"), std::string::npos) << c.method;
     EXPECT_GT(record::read_recording(log).column("time").values.size(), 500u) << c.method;
-    EXPECT_EQ(test::read_text(folder_ / "params.toml"), kParams) << c.method;
+    EXPECT_EQ(test::read_text(folder_ / "params.toml"), kTuneParams) << c.method;
   }
 }
 
