@@ -1,11 +1,14 @@
 #include "isac/explain/fit.hpp"
 
 #include <ceres/cost_function.h>
+#include <ceres/manifold.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "isac/explain/bounded_fit.hpp"
 
 namespace isac::explain {
 namespace {
@@ -158,31 +161,50 @@ class Rows final : public ceres::CostFunction {
           weights.sigma[static_cast<int>(predictor.data().rows[static_cast<std::size_t>(rows_[i])].chain)];
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+  bool at(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) const {
     ModelPoint model = model_;
     for (std::size_t j = 0; j < coordinates_.size(); ++j)
-      set(model, coordinates_[j], parameters[0][j] * coordinates_[j].scale);
+      set(model, coordinates_[j], x[static_cast<Eigen::Index>(j)] * coordinates_[j].scale);
     Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_.rows()));
     predictor_.predict(model, chains_, here);
     const Eigen::VectorXd& measured = predictor_.measured();
-    const std::size_t n = rows_.size(), m = coordinates_.size();
-    for (std::size_t i = 0; i < n; ++i)
-      residuals[i] = (here[rows_[i]] - measured[rows_[i]]) * weight_[static_cast<Eigen::Index>(i)];
-    if (!std::all_of(residuals, residuals + n, [](double r) { return std::isfinite(r); })) return false;
-    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
-    Eigen::VectorXd column = here;
-    for (std::size_t j = 0; j < m; ++j) {
+    const auto n = static_cast<Eigen::Index>(rows_.size());
+    residual.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Eigen::Index row = rows_[static_cast<std::size_t>(i)];
+      residual[i] = (here[row] - measured[row]) * weight_[i];
+    }
+    if (!residual.allFinite()) return false;
+    if (jacobian == nullptr) return true;
+    jacobian->resize(n, static_cast<Eigen::Index>(coordinates_.size()));
+    Eigen::VectorXd column;
+    for (std::size_t j = 0; j < coordinates_.size(); ++j) {
       const Coordinate& c = coordinates_[j];
+      const auto k = static_cast<Eigen::Index>(j);
       column = here;
-      differentiate(predictor_, model, here, c, parameters[0][j] * c.scale, column);
-      for (std::size_t i = 0; i < n; ++i) {
-        const bool touched =
-            (bit(predictor_.data().rows[static_cast<std::size_t>(rows_[i])].chain) & c.chains) != 0;
-        const double slope =
-            touched ? column[rows_[i]] * weight_[static_cast<Eigen::Index>(i)] * c.scale : 0.0;
-        jacobians[0][i * m + j] = std::isfinite(slope) ? slope : 0.0;
+      differentiate(predictor_, model, here, c, x[k] * c.scale, column);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const auto row = static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]);
+        const bool touched = (bit(predictor_.data().rows[row].chain) & c.chains) != 0;
+        const double slope = touched ? column[static_cast<Eigen::Index>(row)] * weight_[i] * c.scale : 0.0;
+        (*jacobian)(i, k) = std::isfinite(slope) ? slope : 0.0;
       }
     }
+    return true;
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const auto n = static_cast<Eigen::Index>(rows_.size()),
+               m = static_cast<Eigen::Index>(coordinates_.size());
+    const bool slopes = jacobians != nullptr && jacobians[0] != nullptr;
+    Eigen::VectorXd residual;
+    Eigen::MatrixXd jacobian;
+    if (!at(Eigen::Map<const Eigen::VectorXd>(parameters[0], m), residual, slopes ? &jacobian : nullptr))
+      return false;
+    Eigen::Map<Eigen::VectorXd>(residuals, n) = residual;
+    if (slopes)
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(jacobians[0], n, m) =
+          jacobian;
     return true;
   }
 
@@ -195,32 +217,54 @@ class Rows final : public ceres::CostFunction {
   Eigen::VectorXd weight_;
 };
 
-void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int iterations) {
-  std::vector<double> x(fit.coordinates.size());
-  for (std::size_t j = 0; j < x.size(); ++j) {
-    const Coordinate& c = fit.coordinates[j];
-    x[j] = std::clamp(fit.value(c), c.lower, c.upper) / c.scale;
-  }
-  ceres::Problem problem;
-  auto* cost = new Rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
-  problem.AddResidualBlock(cost, nullptr, x.data());
-  for (std::size_t j = 0; j < x.size(); ++j) {
-    const Coordinate& c = fit.coordinates[j];
-    problem.SetParameterLowerBound(x.data(), static_cast<int>(j), c.lower / c.scale);
-    problem.SetParameterUpperBound(x.data(), static_cast<int>(j), c.upper / c.scale);
-  }
+/// The last steps within the bounds that are not touched; those that are stay held.
+void polish(Rows& rows, const Eigen::VectorXd& lower, const Eigen::VectorXd& upper, Eigen::VectorXd& x) {
+  std::vector<int> held;
+  for (Eigen::Index j = 0; j < x.size(); ++j)
+    if (x[j] <= lower[j] || x[j] >= upper[j]) held.push_back(static_cast<int>(j));
+  if (held.size() == static_cast<std::size_t>(x.size())) return;
+  ceres::Problem::Options ownership;
+  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(ownership);
+  Eigen::VectorXd better = x;
+  problem.AddResidualBlock(&rows, nullptr, better.data());
+  if (!held.empty())
+    problem.SetManifold(better.data(), new ceres::SubsetManifold(static_cast<int>(x.size()), held));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = iterations;
+  options.max_num_iterations = 3;
   options.function_tolerance = 1e-8;
   options.parameter_tolerance = 1e-7;
   options.logging_type = ceres::SILENT;
   options.num_threads = 1;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
-  fit.converged = summary.IsSolutionUsable();
-  for (std::size_t j = 0; j < x.size(); ++j)
-    set(fit.model, fit.coordinates[j], x[j] * fit.coordinates[j].scale);
+  if (summary.IsSolutionUsable() && (better.array() >= lower.array()).all() &&
+      (better.array() <= upper.array()).all())
+    x = better;
+}
+
+void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rounds, bool last) {
+  const auto m = static_cast<Eigen::Index>(fit.coordinates.size());
+  Eigen::VectorXd x(m), lower(m), upper(m);
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const Coordinate& c = fit.coordinates[static_cast<std::size_t>(j)];
+    lower[j] = c.lower / c.scale;
+    upper[j] = c.upper / c.scale;
+    x[j] = fit.value(c) / c.scale;
+  }
+  Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
+  const BoundedFit found =
+      bounded_fit([&](const Eigen::VectorXd& at, Eigen::VectorXd& residual,
+                      Eigen::MatrixXd* jacobian) { return rows.at(at, residual, jacobian); },
+                  x, lower, upper, {.rounds = rounds, .tolerance = 1e-7});
+  fit.converged = found.converged;
+  x = found.x;
+  if (last) polish(rows, lower, upper, x);
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const Coordinate& c = fit.coordinates[static_cast<std::size_t>(j)];
+    set(fit.model, c, x[j] * c.scale);
+  }
   // The rows that were refitted; the others stay.
   Eigen::VectorXd prediction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(fit.model, fit.chains, prediction);
@@ -274,7 +318,7 @@ Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tole
   for (std::size_t i = 0; i < tolerances.size(); ++i)
     fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
   add_rest(predictor, fit.model, kAllChains, fit.coordinates);
-  solve(predictor, fit, weights, 30);
+  solve(predictor, fit, weights, 30, false);
   return fit;
 }
 
@@ -296,7 +340,7 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
   add_rest(predictor, fit.model, fit.chains, fit.coordinates);
   add_effects(fit.model, fit.tolerances, fit.chains, fit.coordinates);
-  solve(predictor, fit, weights, iterations);
+  solve(predictor, fit, weights, iterations, true);
   return fit;
 }
 
@@ -336,14 +380,20 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
 
 Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
                          const Active& effect, const Weights& weights) {
-  Eigen::VectorXd after = here;
-  ModelPoint with = fit.model;
-  with.effects.push_back(effect);
-  predictor.predict(with, effect.hypothesis->chains, after);
-  after -= here;
+  Eigen::VectorXd change;
+  if (predictor.adds_up(fit.model, *effect.hypothesis)) {
+    change = Eigen::VectorXd::Zero(here.size());
+    predictor.predict_addition(fit.model, effect, change);
+  } else {
+    change = here;
+    ModelPoint with = fit.model;
+    with.effects.push_back(effect);
+    predictor.predict(with, effect.hypothesis->chains, change);
+    change -= here;
+  }
   for (std::size_t i = 0; i < predictor.rows(); ++i)
-    after[static_cast<Eigen::Index>(i)] /= weights.sigma[static_cast<int>(predictor.data().rows[i].chain)];
-  return after;
+    change[static_cast<Eigen::Index>(i)] /= weights.sigma[static_cast<int>(predictor.data().rows[i].chain)];
+  return change;
 }
 
 }  // namespace isac::explain

@@ -24,6 +24,11 @@ bool is_null(const Active& a) {
   return null_values(*a.hypothesis, a.values) == a.values;
 }
 
+/// (e^s − 1)/s; where s is small, by its series to 1e-9.
+double growth(double s) {
+  return std::abs(s) < 0.03 ? 1 + s * (0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120))) : std::expm1(s) / s;
+}
+
 /// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
 /// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
 class Memory {
@@ -40,16 +45,15 @@ class Memory {
     if (count_ == 1) {
       // A state that slips at its limit must not run past it within a sample.
       const double first = rate(middle, z_[0]);
+      if (first == 0) return;
       const int parts =
           active_.hypothesis->dry ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
       const double h = dt / parts;
       for (int part = 0; part < parts; ++part) {
-        const double f = rate(middle, z_[0]);
+        const double f = part == 0 ? first : rate(middle, z_[0]);
         constexpr double kNudge = 1e-6;
         const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * h;
-        const double phi =
-            std::abs(slope) < 1e-6 ? 1 + 0.5 * slope : std::expm1(std::min(slope, 5.0)) / slope;
-        z_[0] += h * f * phi;
+        z_[0] += h * f * growth(std::min(slope, 5.0));
       }
       return;
     }
@@ -188,6 +192,30 @@ Predictor::Predictor(const Prepared& data) : data_(&data) {
   }
 }
 
+namespace {
+
+/// A reading with play stands half the play behind the motion; while it stands still after a turn, the joint crosses the play,
+/// slowly at first.
+void undo_play(const std::vector<double>& velocity, double half, std::vector<double>& angle) {
+  double side = 0;
+  std::size_t moved = 0;  // the sample after the last one in motion
+  for (std::size_t k = 0; k < angle.size(); ++k) {
+    if (velocity[k] == 0) continue;
+    const double now = velocity[k] > 0 ? 1.0 : -1.0;
+    if (side == 0) side = now;  // where in its play it started is not known; from the first motion on it is
+    for (std::size_t i = moved; i < k; ++i) {
+      const double share = static_cast<double>(i - moved + 1) / static_cast<double>(k - moved + 1);
+      angle[i] += half * (side + (now - side) * share * share);
+    }
+    angle[k] += half * now;
+    side = now;
+    moved = k + 1;
+  }
+  for (std::size_t i = moved; i < angle.size(); ++i) angle[i] += half * side;
+}
+
+}  // namespace
+
 /// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot.
 void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const {
   std::vector<const Active*> readings;
@@ -203,20 +231,18 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
   for (auto it = readings.rbegin(); it != readings.rend(); ++it) {  // the last first
     const Hypothesis& h = *(*it)->hypothesis;
     const double* q = (*it)->values.data();
-    const std::vector<double> read = truth;
-    for (int round = 0; round < (h.info().state_count > 0 ? 1 : kInversions); ++round) {
-      double z[models::kMaxEffectStates] = {};
-      models::Readings<double> y;
-      y.angle = read[0];
-      models::effect_reading_rest(h.effect, q, y, z);
-      for (std::size_t k = 0; k < n; ++k) {
-        y.angle = truth[k];
-        models::effect_reading_step(h.effect, q, y, z);
-        const double before = y.angle;
-        models::effect_reading(h.effect, q, time_of(h, run, k), z, y);
-        truth[k] = read[k] - (y.angle - before);
-      }
+    if (h.info().state_count > 0) {
+      undo_play(run.dry_velocity, q[0], truth);
+      continue;
     }
+    const std::vector<double> read = truth;
+    for (int round = 0; round < kInversions; ++round)
+      for (std::size_t k = 0; k < n; ++k) {
+        models::Readings<double> y;
+        y.angle = truth[k];
+        models::effect_reading(h.effect, q, time_of(h, run, k), static_cast<const double*>(nullptr), y);
+        truth[k] = read[k] - (y.angle - truth[k]);
+      }
   }
   const bool slow = !run.slow_acceleration.empty();
   if (smooth) {
@@ -466,7 +492,7 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
           models::effect_reading_derivative(h.effect, a.values.data(), middle, nudged, g);
           for (int i = 0; i < 2; ++i) {
             const double slope = (g[i] - f[i]) / 1e-6 * run.interval;
-            z[i] += run.interval * f[i] * (std::abs(slope) < 1e-6 ? 1.0 : std::expm1(slope) / slope);
+            z[i] += run.interval * f[i] * growth(slope);
           }
         }
         last[0] = before[0];
@@ -539,7 +565,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
         models::effect_command(effect, q, x, e.z, again);
         for (int i = 0; i < count; ++i) {
           const double slope = (g[i] - f[i]) / kNudge * move;
-          e.z[i] += move * f[i] * (std::abs(slope) < 1e-9 ? 1.0 : std::expm1(slope) / slope);
+          e.z[i] += move * f[i] * growth(slope);
         }
       } else {
         models::effect_command(effect, q, x, e.z, again);
@@ -566,12 +592,22 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
            e.active->hypothesis->info().id != std::string_view("valve_hysteresis");
   });
   const int substeps = with_states ? 4 : 1;
+  if (effects.empty()) {
+    // The same steps for the first-order lag alone, bit for bit.
+    for (std::size_t k = 0; k < n; ++k)
+      for (int i = 0; i < 2; ++i) {
+        p[i][k] = state[i];
+        const double u = gain * command(i, k), middle = state[i] + 0.5 * dt * ((u - state[i]) / lag);
+        state[i] += dt * ((u - middle) / lag);
+      }
+    return;
+  }
   for (std::size_t k = 0; k < n; ++k) {
     p[0][k] = state[0];
     p[1][k] = state[1];
     if (k + 1 == n) break;
     const double u[2] = {command(0, k), command(1, k)};
-    if (!effects.empty()) {
+    {
       // States that only step (play) see the command as the effects before them leave it.
       double chain[2] = {gain * u[0], gain * u[1]};
       x.pressure[0] = state[0];
@@ -699,6 +735,33 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
     const Kernel kernel(data_->smoothing.torque / run.interval);
     for_rows(Chain::kPressure1, [&](std::size_t k) { return kernel(p[0], k); });
     for_rows(Chain::kPressure2, [&](std::size_t k) { return kernel(p[1], k); });
+  }
+}
+
+bool Predictor::adds_up(const ModelPoint& model, const Hypothesis& effect) const noexcept {
+  return effect.info().hook == Hook::kTorque && !reads_force(model);
+}
+
+void Predictor::predict_addition(const ModelPoint& model, const Active& effect, Eigen::VectorXd& out) const {
+  ModelPoint alone = model;
+  alone.effects = {effect};
+  for (std::size_t r = 0; r < data_->runs.size(); ++r) {
+    const PreparedRun& run = data_->runs[r];
+    const std::size_t begin = data_->run_begin[r], end = data_->run_begin[r + 1];
+    if (begin == end) continue;
+    const std::shared_ptr<const Inputs> in = inputs_of(model, r);
+    for (const Chain chain : {Chain::kTorque, Chain::kMotion}) {
+      const bool motion = chain == Chain::kMotion;
+      if ((effect.hypothesis->chains & bit(chain)) == 0) continue;
+      if (motion ? !run.is_free || run.slow_acceleration.empty() : !run.has_torque) continue;
+      const std::vector<double> torque = torque_of_effects(alone, run, *in, motion);
+      if (torque.empty()) continue;
+      const double sign = motion ? -1.0 : 1.0;
+      const Kernel kernel((motion ? data_->smoothing.motion : data_->smoothing.torque) / run.interval);
+      for (std::size_t i = begin; i < end; ++i)
+        if (data_->rows[i].chain == chain)
+          out[static_cast<Eigen::Index>(i)] = sign * kernel(torque, data_->rows[i].sample);
+    }
   }
 }
 

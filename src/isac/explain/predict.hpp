@@ -55,6 +55,10 @@ class Predictor {
   /// Predictions of the rows of one run that belong to the chains asked for; other rows of `out` stay as they are.
   void predict_run(const ModelPoint& model, std::size_t run, unsigned chains, Eigen::VectorXd& out) const;
   void predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const;
+  /// Does the effect only add a torque of its own, whatever else is in the model?
+  [[nodiscard]] bool adds_up(const ModelPoint& model, const Hypothesis& effect) const noexcept;
+  /// What such an effect adds to the rows of its chains; other rows of `out` stay as they are.
+  void predict_addition(const ModelPoint& model, const Active& effect, Eigen::VectorXd& out) const;
   /// The prediction at the recording's rate, for pictures and for floors: torque (and pressures) of one run.
   struct FullRate {
     std::vector<double> torque, pressure[2], motion;

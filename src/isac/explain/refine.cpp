@@ -1,19 +1,16 @@
 #include "isac/explain/refine.hpp"
 
-#include <ceres/cost_function.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string_view>
 
+#include "isac/explain/bounded_fit.hpp"
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
 namespace {
 
-class Projected final : public ceres::CostFunction {
+class Projected {
  public:
   Projected(const Around& place, const Hypothesis& hypothesis, const Values& start,
             std::vector<std::size_t> free, std::vector<double> scale)
@@ -21,42 +18,36 @@ class Projected final : public ceres::CostFunction {
         hypothesis_(hypothesis),
         values_(start),
         free_(std::move(free)),
-        scale_(std::move(scale)) {
-    set_num_residuals(static_cast<int>(place.residual.size()));
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(free_.size()));
-  }
+        scale_(std::move(scale)) {}
 
-  Eigen::VectorXd residual_at(const double* x) const {
+  Eigen::VectorXd residual_at(const Eigen::VectorXd& x) const {
     Active a;
     a.hypothesis = &hypothesis_;
     a.values = values_;
-    for (std::size_t j = 0; j < free_.size(); ++j) a.values[free_[j]] = x[j] * scale_[j];
+    for (std::size_t j = 0; j < free_.size(); ++j)
+      a.values[free_[j]] = x[static_cast<Eigen::Index>(j)] * scale_[j];
     return place_.residual +
            place_.project(response(*place_.predictor, *place_.fit, place_.here, a, *place_.weights));
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const Eigen::VectorXd here = residual_at(parameters[0]);
+  bool operator()(const Eigen::VectorXd& at, Eigen::VectorXd& here, Eigen::MatrixXd* jacobian) const {
+    here = residual_at(at);
     if (!here.allFinite()) return false;
-    Eigen::Map<Eigen::VectorXd>(residuals, here.size()) = here;
-    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
-    const auto m = static_cast<Eigen::Index>(free_.size());
-    Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> j(jacobians[0],
-                                                                                         here.size(), m);
-    std::vector<double> x(parameters[0], parameters[0] + free_.size());
-    for (Eigen::Index k = 0; k < m; ++k) {
+    if (jacobian == nullptr) return true;
+    jacobian->resize(here.size(), at.size());
+    Eigen::VectorXd x = at;
+    for (Eigen::Index k = 0; k < at.size(); ++k) {
       const auto i = static_cast<std::size_t>(k);
       // Onsets and widths move events from sample to sample: a longer step sees more of them.
       const bool shape = std::isnan(hypothesis_.info().parameters[free_[i]].null_value);
       const bool memory = hypothesis_.info().state_count > 0;
       double step = memory ? 1e-2 : shape ? 2e-3 : 1e-4;
-      if ((x[i] + step) * scale_[i] > hypothesis_.upper[free_[i]]) step = -step;
-      const double kept = x[i];
-      x[i] = kept + step;
-      const Eigen::VectorXd there = residual_at(x.data());
-      x[i] = kept;
+      if ((x[k] + step) * scale_[i] > hypothesis_.upper[free_[i]]) step = -step;
+      x[k] = at[k] + step;
+      const Eigen::VectorXd there = residual_at(x);
+      x[k] = at[k];
       if (!there.allFinite()) return false;
-      j.col(k) = (there - here) / step;
+      jacobian->col(k) = (there - here) / step;
     }
     return true;
   }
@@ -85,7 +76,7 @@ Around around(const Predictor& predictor, const Fit& fit, const Weights& weights
 
 Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& start, int iterations) {
   std::vector<std::size_t> free;
-  std::vector<double> scale, x;
+  std::vector<double> scale;
   for (int i = 0; i < hypothesis.info().parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     if (!hypothesis.free[k]) continue;
@@ -93,27 +84,22 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
     double s = std::max(std::abs(start[k]), 1e-3 * std::abs(hypothesis.info().parameters[i].typical));
     if (!(s > 0)) s = 1;
     scale.push_back(s);
-    x.push_back(start[k] / s);
   }
-  ceres::Problem problem;
-  auto* cost = new Projected(place, hypothesis, start, free, scale);
-  problem.AddResidualBlock(cost, nullptr, x.data());
-  for (std::size_t j = 0; j < x.size(); ++j) {
-    problem.SetParameterLowerBound(x.data(), static_cast<int>(j), hypothesis.lower[free[j]] / scale[j]);
-    problem.SetParameterUpperBound(x.data(), static_cast<int>(j), hypothesis.upper[free[j]] / scale[j]);
+  const auto m = static_cast<Eigen::Index>(free.size());
+  Eigen::VectorXd x(m), lower(m), upper(m);
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    x[j] = start[free[i]] / scale[i];
+    lower[j] = hypothesis.lower[free[i]] / scale[i];
+    upper[j] = hypothesis.upper[free[i]] / scale[i];
   }
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = iterations;
-  options.function_tolerance = 1e-6;
-  options.parameter_tolerance = 1e-5;
-  options.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(options, &problem, &summary);
+  const Projected problem(place, hypothesis, start, free, scale);
+  BoundedFit fit = bounded_fit(problem, x, lower, upper, {.rounds = iterations, .tolerance = 1e-6});
+  x = fit.x;
   Refined refined;
-  refined.values = start;
-  for (std::size_t j = 0; j < x.size(); ++j) refined.values[free[j]] = x[j] * scale[j];
-  refined.residual = cost->residual_at(x.data());
+  refined.residual = std::move(fit.residual);
+  if (refined.residual.size() == 0 || !refined.residual.allFinite())
+    refined.residual = place.residual;  // breaks down there
   refined.loss = refined.residual.squaredNorm();
   const bool staircase =
       hypothesis.info().state_count > 0 && (hypothesis.dry || hypothesis.reads_angle ||
@@ -124,13 +110,11 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
       bool better = true;
       for (int round = 0; better && round < 3; ++round) {
         better = false;
-        for (std::size_t j = 0; j < x.size(); ++j)
+        for (Eigen::Index j = 0; j < m; ++j)
           for (const double factor : {1 + change, 1 / (1 + change)}) {
-            std::vector<double> tried = x;
-            tried[j] =
-                std::clamp(x[j] * factor * scale[j], hypothesis.lower[free[j]], hypothesis.upper[free[j]]) /
-                scale[j];
-            Eigen::VectorXd residual = cost->residual_at(tried.data());
+            Eigen::VectorXd tried = x;
+            tried[j] = std::clamp(x[j] * factor, lower[j], upper[j]);
+            Eigen::VectorXd residual = problem.residual_at(tried);
             const double loss = residual.squaredNorm();
             if (!(loss < refined.loss * (1 - 1e-7))) continue;
             refined.loss = loss;
@@ -140,8 +124,10 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
           }
       }
     }
-    for (std::size_t j = 0; j < x.size(); ++j) refined.values[free[j]] = x[j] * scale[j];
   }
+  refined.values = start;
+  for (Eigen::Index j = 0; j < m; ++j)
+    refined.values[free[static_cast<std::size_t>(j)]] = x[j] * scale[static_cast<std::size_t>(j)];
   return refined;
 }
 
