@@ -168,7 +168,38 @@ struct MaxwellSlip {
   }
 };
 
-using OtherForms =
-    EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction, PressureCreep, MaxwellSlip>;
+/// The whole supply sags with the flow, not only its upper end: the valve opens in proportion to it.
+struct SupplySag {
+  static constexpr EffectInfo kInfo{.id = "supply_sag",
+                                    .term = "supply that falls in proportion to the flow",
+                                    .where = Subsystem::kPcu,
+                                    .equation = "u -> (1 - k z) u, z' = (p1'+ + p2'+ - z)/tau",
+                                    .parameter_count = 2,
+                                    .parameters = {{"k", "s cm2/kg", 1.0 / kPascalPerKgfCm2, 0,
+                                                    1.0 / kPascalPerKgfCm2, 0.03 / kPascalPerKgfCm2},
+                                                   {"tau", "s", 1, 0.05, 100, 0.5, kAnyValue}},
+                                    .state_count = 1,
+                                    .torque_term = false,
+                                    .linear = false,
+                                    .confused_with = "flow_limit, asymmetric_fill_vent",
+                                    .told_apart_by = "one muscle's filling slows the other",
+                                    .hook = Hook::kCommand,
+                                    .reported_as = "supply_droop"};
+  template <class S>
+  static void command(const S* q, const ValvePoint<S>&, const S* z, S* u) noexcept {
+    for (int i = 0; i < 2; ++i) u[i] = (S(1.0) - q[0] * z[0]) * u[i];
+  }
+  template <class S>
+  static void derivative(const S* q, const ValvePoint<S>&, const S*, const S* v, const S* z, S* dz) noexcept {
+    dz[0] = (positive_part(v[0]) + positive_part(v[1]) - z[0]) / q[1];
+  }
+  template <class S>
+  static void rest(const S*, const ValvePoint<S>&, S* z) noexcept {
+    z[0] = S(0.0);
+  }
+};
+
+using OtherForms = EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction,
+                              PressureCreep, MaxwellSlip, SupplySag>;
 
 }  // namespace isac::models::effect
