@@ -214,17 +214,22 @@ Residuals residuals(const Rig& rig, const Baseline& base, const RunPlan& run, co
 
 Gap gap_of(const Rig& rig, const Baseline& base, const std::vector<RunPlan>& runs,
            const std::vector<Signals>& signals, bool heldout) {
-  double torque = 0, pressure = 0, balance = 0, n_torque = 0, n_pressure = 0, n_balance = 0;
+  struct Mean {
+    double sum = 0, count = 0;
+    void add(const std::vector<double>& x) { sum += mean_square(x, count); }
+    [[nodiscard]] double root() const { return count > 0.0 ? std::sqrt(sum / count) : 0.0; }
+  };
+  Mean torque, driven, pressure, p1, p2, balance;
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].heldout != heldout) continue;
     const Residuals rest = residuals(rig, base, runs[i], signals[i]);
-    torque += mean_square(rest.torque, n_torque);
-    pressure += mean_square(rest.p1, n_pressure);
-    pressure += mean_square(rest.p2, n_pressure);
-    balance += mean_square(rest.balance, n_balance);
+    torque.add(rest.torque);
+    if (!runs[i].free) driven.add(rest.torque);
+    for (Mean* m : {&pressure, &p1}) m->add(rest.p1);
+    for (Mean* m : {&pressure, &p2}) m->add(rest.p2);
+    balance.add(rest.balance);
   }
-  const auto root = [](double sum, double count) { return count > 0.0 ? std::sqrt(sum / count) : 0.0; };
-  return {root(torque, n_torque), root(pressure, n_pressure), root(balance, n_balance)};
+  return {torque.root(), pressure.root(), balance.root(), driven.root(), p1.root(), p2.root()};
 }
 
 }  // namespace blind

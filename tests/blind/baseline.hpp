@@ -26,6 +26,8 @@ struct Residuals {
 /// Root mean squares over runs.
 struct Gap {
   double torque = 0, pressure = 0, balance = 0;
+  double driven = 0;      ///< torque of the runs in which the joint is led or clamped
+  double p1 = 0, p2 = 0;  ///< pressure, one by one
 };
 
 /// Standard deviation of φ̈ (rad/s²) for a white error of the angle.

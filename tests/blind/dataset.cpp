@@ -107,12 +107,15 @@ Dataset make_dataset(const Request& request) {
 
 Gap heldout_noise(const Dataset& d, const std::vector<Signals>& noisy) {
   // What noise adds to the residual of a model that leaves nothing else: the residual of noisy minus that of clean.
-  double torque = 0, pressure = 0, balance = 0, n_torque = 0, n_pressure = 0, n_balance = 0;
-  const auto add = [](const std::vector<double>& a, const std::vector<double>& b, double& sum,
-                      double& count) {
-    for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
-    count += static_cast<double>(a.size());
+  struct Mean {
+    double sum = 0, count = 0;
+    void add(const std::vector<double>& a, const std::vector<double>& b) {
+      for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+      count += static_cast<double>(a.size());
+    }
+    [[nodiscard]] double root() const { return std::sqrt(sum / std::max(1.0, count)); }
   };
+  Mean torque, driven, pressure, p1, p2, balance;
   for (std::size_t i = 0; i < d.runs.size(); ++i) {
     if (!d.runs[i].heldout) continue;
     // The velocity's noise depends on who differentiates; the clean angle is taken, so that only the sensors' part counts.
@@ -120,13 +123,13 @@ Gap heldout_noise(const Dataset& d, const std::vector<Signals>& noisy) {
     mixed.angle = d.clean[i].angle;
     const Residuals a = residuals(d.rig, d.base, d.runs[i], mixed),
                     b = residuals(d.rig, d.base, d.runs[i], d.clean[i]);
-    add(a.torque, b.torque, torque, n_torque);
-    add(a.p1, b.p1, pressure, n_pressure);
-    add(a.p2, b.p2, pressure, n_pressure);
-    add(a.balance, b.balance, balance, n_balance);
+    torque.add(a.torque, b.torque);
+    if (!d.runs[i].free) driven.add(a.torque, b.torque);
+    for (Mean* m : {&pressure, &p1}) m->add(a.p1, b.p1);
+    for (Mean* m : {&pressure, &p2}) m->add(a.p2, b.p2);
+    balance.add(a.balance, b.balance);
   }
-  return {std::sqrt(torque / std::max(1.0, n_torque)), std::sqrt(pressure / std::max(1.0, n_pressure)),
-          std::sqrt(balance / std::max(1.0, n_balance))};
+  return {torque.root(), pressure.root(), balance.root(), driven.root(), p1.root(), p2.root()};
 }
 
 }  // namespace blind

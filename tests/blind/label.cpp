@@ -76,6 +76,10 @@ std::string label_of(const Dataset& d, const Gap& noise, const Verdict* oracle) 
   write_gap(json, "torque", "N m", d.gap.torque, d.heldout_gap.torque, noise.torque);
   write_gap(json, "pressure", "kg/cm2", d.gap.pressure, d.heldout_gap.pressure, noise.pressure);
   write_gap(json, "balance", "N m", d.gap.balance, d.heldout_gap.balance, noise.balance);
+  // What an answer's gap is counted on: the torque without the free runs, each pressure by itself.
+  write_gap(json, "driven", "N m", d.gap.driven, d.heldout_gap.driven, noise.driven);
+  write_gap(json, "p1", "kg/cm2", d.gap.p1, d.heldout_gap.p1, noise.p1);
+  write_gap(json, "p2", "kg/cm2", d.gap.p2, d.heldout_gap.p2, noise.p2);
   json.close('}');
   if (oracle == nullptr) {
     json.key("oracle").null();

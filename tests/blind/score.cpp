@@ -82,7 +82,7 @@ Answer read_answer(const std::string& text) {
     }
     const json& gap = j.at("gap");
     if (gap.is_object()) {
-      a.unit = gap.value("unit", "");
+      a.signal = gap.value("signal", "");
       a.heldout_before = number(gap, "heldout_before");
       a.heldout_after = number(gap, "heldout_after");
     }
@@ -92,17 +92,15 @@ Answer read_answer(const std::string& text) {
   return a;
 }
 
-/// Share of the power on held-out runs that the answer took away, over the share that the true model would.
+/// Power on held-out runs that the answer took away, over the power that the true model would.
 double closed_share(const Truth& t, const Answer& a) {
   if (a.heldout_before <= 0.0 || t.gap.empty()) return -1.0;
-  const bool pressure = a.unit.find("kg") != std::string::npos || a.unit.find("Pa") != std::string::npos ||
-                        a.unit.find("bar") != std::string::npos;
-  const std::string signal = pressure ? "pressure" : t.signal == "balance" ? "balance" : "torque";
+  const std::string signal = a.signal == "motion" ? "balance" : a.signal == "torque" ? "driven" : a.signal;
+  if (!t.gap.contains(signal)) return -1.0;
   const double gap = t.gap.at(signal), noise = t.gap_noise.at(signal);
-  const double possible = gap * gap / (gap * gap + noise * noise);
-  if (possible < 1e-3) return -1.0;  // nothing to close in the signal that the answer speaks of
-  const double left = a.heldout_after / a.heldout_before;
-  return (1.0 - left * left) / possible;
+  if (gap * gap < 1e-3 * noise * noise)
+    return -1.0;  // nothing to close in the signal that the answer speaks of
+  return (a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after) / (gap * gap);
 }
 
 }  // namespace

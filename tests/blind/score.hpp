@@ -18,13 +18,13 @@ struct Truth {
   bool testable = true;
   std::vector<std::string> ids, subsystems, depends_on;
   std::string nearest_equal;  ///< the nearest rival below three sigma, or empty
-  /// Per signal (torque, pressure, balance): gap that the true model closes on held-out runs, and the noise left.
+  /// Per signal (torque, driven, pressure, p1, p2, balance): gap that the true model closes on held-out runs, and the noise left.
   std::map<std::string, double> gap, gap_noise;
 };
 
 /// What an answer says. `failed` is not empty when there is none.
 struct Answer {
-  std::string failed, verdict, where, unit;
+  std::string failed, verdict, where, signal;
   bool detected = false;
   std::vector<std::string> effects, alternatives, depends_on;
   std::vector<double> confidences;      ///< of `effects`

@@ -15,8 +15,8 @@ Case single(const std::string& truth) {
   one.truth.signal = "torque";
   one.truth.ratio = 0.75;
   one.truth.ids = {truth};
-  one.truth.gap = {{"torque", 0.01}, {"pressure", 0.0}, {"balance", 0.0}};
-  one.truth.gap_noise = {{"torque", 0.02}, {"pressure", 0.004}, {"balance", 0.01}};
+  one.truth.gap = {{"driven", 0.01}, {"pressure", 0.0}, {"balance", 0.0}};
+  one.truth.gap_noise = {{"driven", 0.02}, {"pressure", 0.004}, {"balance", 0.01}};
   return one;
 }
 
@@ -94,7 +94,7 @@ TEST(Score, wants_both_of_two_effects) {
 TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
   Case one = single("creep");
   one.answer = named({"creep"});
-  one.answer.unit = "N m";
+  one.answer.signal = "torque";
   one.answer.heldout_before = std::sqrt(0.01 * 0.01 + 0.02 * 0.02);
   one.answer.heldout_after = 0.02;  // down to the noise: all of it
   EXPECT_NEAR(judge_case(one).closed, 1.0, 1e-12);
