@@ -54,6 +54,7 @@ int run(Words words) {
   explain::ExplainOptions options;
   options.rig = inputs.facts;
   options.baseline = inputs.baseline;
+  options.limits = inputs.limits;
   options.excluded = words.excluded;
   options.threads = words.threads;
   options.seed = words.seed;

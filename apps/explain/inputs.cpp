@@ -47,6 +47,16 @@ explain::RigFacts facts_of(const record::Rig& rig, bool rig_given) {
   return facts;
 }
 
+series::ExcitationOptions limits_of(const record::RigLimits& limits) {
+  series::ExcitationOptions out;
+  out.delta_pressure_limit = limits.delta_pressure;
+  out.pressure_limit = limits.pressure;
+  out.angle_limit = limits.angle;
+  out.speed_limit = limits.speed;
+  out.force_limit = limits.force;
+  return out;
+}
+
 bool uses_pressure(const explain::BaselineModel& baseline) {
   return baseline.terms.empty() ||
          std::any_of(baseline.terms.begin(), baseline.terms.end(), [](const std::string& term) {
@@ -101,6 +111,7 @@ ExplainInputs read_inputs(const ExplainWords& words) {
   }
   if (inputs.title.empty()) inputs.title = inputs.rig.name;
   inputs.facts = facts_of(inputs.rig, !files.rig.empty());
+  inputs.limits = limits_of(inputs.rig.limits);
   record::ReadOptions reading{.map = parse_maps(words.maps), .require_time = true, .hash = words.hash};
   inputs.runs = read_runs(files.runs, reading, inputs.baseline);
   if ((uses_pressure(inputs.baseline) || inputs.baseline.output == "torque") &&

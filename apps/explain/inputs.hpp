@@ -26,6 +26,7 @@ struct ExplainInputs {
   std::string title;     ///< the model's or the rig's name
   explain::RigFacts facts;
   explain::BaselineModel baseline;
+  series::ExcitationOptions limits;  ///< of the rig file, for the experiment that is asked for
   std::vector<series::Recording> runs;
   explain::HeldOut heldout;
   std::vector<std::string> sources;  ///< "sha256:<digits> name" of the runs that are fitted

@@ -23,6 +23,7 @@
 
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/prepared.hpp"
+#include "isac/series/excitation.hpp"
 
 namespace isac::explain {
 
@@ -32,12 +33,13 @@ struct ExplainOptions {
   std::vector<std::string> excluded{};  ///< effects that are not to be considered
   double significance = 0.005;          ///< of the whole search, for "something is missing"
   /// Smaller than this share of the noise floor is immaterial.
-  double material = 0.20;
+  double material = 0.15;
   int most_effects = 3;
   int threads = 2;
   std::uint64_t seed = 1;
-  bool traces = true;           ///< fill the columns for pictures
-  bool next_experiment = true;  ///< look for the experiment that separates what is tied
+  bool traces = true;                  ///< fill the columns for pictures
+  series::ExcitationOptions limits{};  ///< of the rig: what an experiment that is asked for must keep
+  bool next_experiment = true;         ///< look for the experiment that separates what is tied
   /// What is being tried, what is ruled out and why; one line each.
   std::function<void(const std::string&)> progress{};
 };

@@ -21,7 +21,7 @@ constexpr std::size_t kMostRegions = 4;
 
 struct Variable {
   const char* name;
-  const char* unit;
+  std::string unit;
   std::vector<double> value;  ///< one for each row of the chain; NaN where it has none
 };
 
@@ -50,6 +50,7 @@ std::vector<Variable> variables_of(const Prepared& data, const std::vector<std::
                                {"travel since the reversal", "rad", {}},
                                {"time in the run", "s", {}},
                                {"time of the day", "s", {}}};
+  for (Variable& v : all) v.unit = axis_unit(v.unit, data.baseline);
   std::vector<std::vector<double>> travel(data.runs.size());
   for (const std::size_t i : rows) {
     const Row& row = data.rows[i];
