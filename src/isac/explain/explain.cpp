@@ -114,7 +114,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                     const ExplainOptions& options) {
   check_terms(options.baseline);
   Prepared data = prepare(runs, options.rig, options.baseline, 4.0);
-  const Library library = make_library(data, options.excluded);
+  Library library = make_library(data, options.excluded);
   const Predictor predictor(data);
   Found found = search(predictor, library, data, options);
 
@@ -162,7 +162,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (!e.effects.empty() && e.gap.heldout_after > 1.002 * e.gap.heldout_before) e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
   if (options.next_experiment && e.verdict != Verdict::kUnknown)
-    e.next_experiment = next_experiment(predictor, library, found, {.threads = options.threads});
+    e.next_experiment =
+        next_experiment(predictor, library, found, {.limits = options.limits, .threads = options.threads});
   e.where = regions(predictor, library, found);
   add_raw_effects(predictor, found, proof, options, e);
   e.could_hide = could_hide(data, library, found, 8);

@@ -17,8 +17,9 @@ using std::string_view;
 
 /// How far the data reaches: what shapes are worth a start.
 struct Reach {
-  double angle_low = 0, angle_high = 0, speed = 0, pressure_low = 0, pressure_high = 0, command_high = 0,
-         rate = 0, force = 0, run_seconds = 0, day_seconds = 0, interval = 0.002;
+  double angle_low = 0, angle_high = 0, free_low = 0, free_high = 0, speed = 0, pressure_low = 0,
+         pressure_high = 0, command_high = 0, rate = 0, force = 0, run_seconds = 0, day_seconds = 0,
+         interval = 0.002;
 };
 
 Reach reach_of(const Prepared& data) {
@@ -30,6 +31,9 @@ Reach reach_of(const Prepared& data) {
     for (const double v : run.angle) {
       reach.angle_low = std::min(reach.angle_low, v);
       reach.angle_high = std::max(reach.angle_high, v);
+      if (!run.is_free) continue;
+      reach.free_low = std::min(reach.free_low, v);
+      reach.free_high = std::max(reach.free_high, v);
     }
     for (const double w : run.velocity) reach.speed = std::max(reach.speed, std::abs(w));
     for (const auto& p : run.pressure)
@@ -65,7 +69,7 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "asymmetric_hysteresis" && at >= 2) return {0.04};
   if (id == "creep" && at == 1) return {1, 4, 15, 60, 250};
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
-  if (id == "series_elasticity" && at == 1) return {9, 15, 25, 40};
+  if (id == "series_elasticity" && at == 1) return {5, 7, 10, 14, 20, 28, 40};
   if (id == "series_elasticity" && at == 2) return {0.05};
   if (id == "backlash" && at == 0) return {0.003, 0.015};
   if (id == "encoder_play" && at == 0) return {0.001, 0.004};
@@ -73,8 +77,6 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
     const double far = std::max(r.angle_high, -r.angle_low);
     return {0.4 * far, 0.65 * far, 0.85 * far};
   }
-  if (id == "end_stop" && at == 1) return {0.55 * r.angle_high, 0.8 * r.angle_high, 0.93 * r.angle_high, 3.0};
-  if (id == "end_stop" && at == 2) return {0.55 * r.angle_low, 0.8 * r.angle_low, 0.93 * r.angle_low, -3.0};
   if (id == "torque_ripple" && at == 2) {
     std::vector<double> grid;
     const double step = 0.6 * kPi / std::max(0.1, r.angle_high - r.angle_low);
@@ -87,6 +89,7 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
     return {0.75 * r.command_high, 0.9 * r.command_high, 1.05 * r.command_high};
   if (id == "supply_droop" && at == 1) return {0.0, 0.3};
   if (id == "supply_droop" && at == 2) return {1.0};
+  if (id == "supply_sag" && at == 1) return {0.25, 0.8};
   if (id == "threshold_pressure" && at == 0) {
     const double low = std::max(0.1 * bar, r.pressure_low);
     return {0.5 * low, 1.3 * low};
@@ -115,10 +118,34 @@ std::vector<Values> shapes_of(const EffectInfo& info, const Reach& reach) {
       }
     shapes = std::move(more);
   }
-  // A stop with both sides out of reach is none.
-  std::erase_if(shapes, [&](const Values& s) {
-    return string_view(info.id) == "end_stop" && s[1] > 2.9 && s[2] < -2.9;
-  });
+  return shapes;
+}
+
+/// Stops on one side or on both, within what the joint reached.
+std::vector<Values> stops(const EffectInfo& info, double low, double high) {
+  std::vector<Values> shapes;
+  const auto add = [&](double upper, double lower) {
+    shapes.push_back({info.parameters[0].typical, upper, lower});
+  };
+  for (const double share : {0.35, 0.55, 0.75, 0.93}) {
+    if (high > 0.05) add(share * high, -3.0);
+    if (low < -0.05) add(3.0, share * low);
+    if (share > 0.5) add(share * high, share * low);
+  }
+  if (shapes.empty()) add(0.05, -0.05);
+  return shapes;
+}
+
+/// A wheel slips while hands are on the rig: between two runs. (Within one, `place_slip` finds the moment.)
+std::vector<Values> slips_between(const EffectInfo& info, const Prepared& data) {
+  std::vector<double> starts;
+  for (const PreparedRun& run : data.runs) starts.push_back(run.day_offset);
+  std::sort(starts.begin(), starts.end());
+  starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
+  std::vector<Values> shapes;
+  for (std::size_t i = 1; i < starts.size(); ++i)
+    shapes.push_back({info.parameters[0].typical, starts[i] - 0.5});
+  if (shapes.empty()) shapes.push_back({info.parameters[0].typical, 10.0});
   return shapes;
 }
 
@@ -187,7 +214,10 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
   Hypothesis h;
   h.effect = effect;
   const EffectInfo& info = h.info();
-  h.shapes = shapes_of(info, reach);
+  const bool moves_freely = reach.free_high > reach.free_low;
+  h.shapes = string_view(info.id) != "end_stop" ? shapes_of(info, reach)
+             : moves_freely                     ? stops(info, reach.free_low, reach.free_high)
+                                                : stops(info, reach.angle_low, reach.angle_high);
   for (int i = 0; i < info.parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     h.lower[k] = info.parameters[i].lower;
@@ -195,6 +225,9 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
     h.free[k] = true;
     h.amplitude[k] = std::isfinite(info.parameters[i].null_value);
   }
+  // A friction that falls over the whole range of speeds is another one.
+  if (string_view(info.id) == "stribeck_friction")
+    h.upper[2] = std::clamp(0.3 * reach.speed, 2 * h.lower[2], h.upper[2]);
   h.dry = jumps_with_direction(effect, info);
   if (info.hook == Hook::kReading || info.hook == Hook::kDelay || info.hook == Hook::kOutlier) {
     const Touches t = touches(effect, info);
@@ -264,6 +297,15 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       if (id == "encoder_offset" || id == "encoder_gain") continue;  // nothing says where the zero is
     }
     Hypothesis h = make_hypothesis(e, reach);
+    if (seed && id == "pressure_gain_error") {  // its gain is the baseline's K_C
+      h.free[0] = h.amplitude[0] = false;
+      for (Values& shape : h.shapes) shape[0] = 0;
+    }
+    if (seed && id == "encoder_slip") {
+      h.clock = Clock::kDay;
+      h.shapes = slips_between(info, data);
+      h.free[1] = false;
+    }
     if (!seed) {
       h.seen_by = SeenBy::kForceSensors;
       h.chains = bit(Chain::kTorque);
@@ -281,7 +323,10 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
     };
     if (!seed) continue;
     if (one_of(id, {"backlash", "end_stop"}))
-      also([](Hypothesis& o) { o.seen_by = SeenBy::kForceSensors, o.chains = bit(Chain::kTorque); });
+      also([&](Hypothesis& o) {
+        o.seen_by = SeenBy::kForceSensors, o.chains = bit(Chain::kTorque);
+        if (id == "end_stop") o.shapes = stops(info, reach.angle_low, reach.angle_high);
+      });
     if (one_of(id, {"stribeck_friction", "hysteresis"}))
       also([](Hypothesis& o) { o.seen_by = SeenBy::kMotionOnly, o.chains = bit(Chain::kMotion); });
     if (one_of(id, {"thermal_drift", "force_drift", "encoder_drift"}) &&
@@ -305,6 +350,40 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
     tolerate("dead_time", -reach.interval, reach.interval);
   }
   return library;
+}
+
+void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual) {
+  struct Point {
+    double time = 0, value = 0;
+    bool inside = false;
+  };
+  constexpr double kFromEnds = 1.0;  // s
+  std::vector<Point> points;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    if (data.rows[i].chain != Chain::kTorque) continue;
+    const PreparedRun& run = data.runs[data.rows[i].run];
+    const double t = run.time[data.rows[i].sample];
+    points.push_back({run.day_offset + t, residual[static_cast<Eigen::Index>(i)],
+                      t > kFromEnds && t < run.time.back() - kFromEnds});
+  }
+  if (points.size() < 100) return;
+  std::stable_sort(points.begin(), points.end(),
+                   [](const Point& a, const Point& b) { return a.time < b.time; });
+  double mean = 0;
+  for (const Point& p : points) mean += p.value / static_cast<double>(points.size());
+  const auto n = static_cast<double>(points.size());
+  double sum = 0, best = 0, at = 0;
+  for (std::size_t k = 0; k + 1 < points.size(); ++k) {
+    sum += points[k].value - mean;
+    const double before = static_cast<double>(k + 1), gain = sum * sum * n / (before * (n - before));
+    if (!points[k].inside || gain <= best) continue;
+    best = gain;
+    at = 0.5 * (points[k].time + points[k + 1].time);
+  }
+  if (best <= 0) return;
+  for (Hypothesis& h : library.hypotheses)
+    if (string_view(h.info().id) == "encoder_slip" && h.clock == Clock::kDay)
+      h.shapes.push_back({h.info().parameters[0].typical, at});
 }
 
 const char* family_of(int effect) noexcept {
@@ -341,6 +420,11 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                                               {"hysteresis", "coulomb_friction"},
                                               {"asymmetric_hysteresis", "hysteresis"},
                                               {"asymmetric_hysteresis", "coulomb_friction"},
+                                              {"asymmetric_hysteresis", "bearing_friction"},
+                                              {"asymmetric_hysteresis", "torque_offset"},
+                                              {"encoder_slip", "encoder_offset"},
+                                              {"encoder_slip", "torque_offset"},
+                                              {"encoder_drift", "encoder_offset"},
                                               {"thermal_drift", "torque_offset"},
                                               {"gravity_imbalance", "torque_offset"},
                                               {"force_offset", "torque_offset"},
@@ -350,6 +434,7 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                                               {"stribeck_friction", "bearing_friction"},
                                               {"hysteresis", "bearing_friction"},
                                               {"supply_droop", "pressure_gain_error"},
+                                              {"pressure_offset", "pressure_gain_error"},
                                               {"series_elasticity", "inertia_error"},
                                               {"end_stop", "tension_loss"}};
   return std::any_of(std::begin(kPairs), std::end(kPairs),

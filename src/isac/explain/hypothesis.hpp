@@ -10,6 +10,7 @@
 /// Units: SI. Threads: values. Errors: none. Source: docs/effects.md, docs/derivations/explain.md.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <vector>
@@ -72,6 +73,9 @@ struct Library {
 
 /// All of the catalogue that the data can speak of, without `excluded` ids (and without what is the baseline's own).
 [[nodiscard]] Library make_library(const Prepared& data, const std::vector<std::string>& excluded = {});
+
+/// Adds to the encoder's slip the moment within a run at which the torque's residual jumps most and stays.
+void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual);
 
 /// Rate-independent dissipation, viscous, elastic …: what a tied verdict falls back to.
 [[nodiscard]] const char* family_of(int effect) noexcept;

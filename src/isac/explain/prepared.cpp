@@ -186,7 +186,8 @@ void add_rows(Prepared& data) {
       const std::vector<unsigned char>& fit =
           chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable;
       for (std::size_t k = 0; k < run.time.size(); k += step)
-        if (fit[k] != 0 && run.time[k] >= skip)
+        // A joint that rests is held by any friction it has: its balance tells nothing there.
+        if (fit[k] != 0 && run.time[k] >= skip && (chain != Chain::kMotion || run.dry_velocity[k] != 0))
           data.rows.push_back({.run = static_cast<unsigned>(r),
                                .sample = static_cast<unsigned>(k),
                                .atom = 0,

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
+#include <numeric>
 #include <random>
 #include <thread>
 #include <tuple>
@@ -16,6 +19,11 @@ namespace isac::explain {
 namespace {
 
 constexpr double kCarryingBlocks = 8;
+// T cannot pass the square root of the blocks that carry a column: with fewer than these, and most of the chain elsewhere, it has
+// no power in a whole search.
+constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
+constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
+constexpr int kBlocksElsewhere = 20;
 
 double upper_tail(double z) {
   return 0.5 * std::erfc(z / std::sqrt(2.0));
@@ -78,6 +86,62 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
 
 struct Task {
   int hypothesis, shape;
+};
+
+/// What scores of any function of the signals scatter, chain by chain, in blocks that a column does not live in.
+class Elsewhere {
+ public:
+  Elsewhere(const std::vector<Column>& columns,
+            const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& joined,
+            std::vector<std::vector<char>> there)
+      : there_(std::move(there)) {
+    for (const Column& c : columns) {
+      if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
+      Functions& f = chains_[static_cast<int>(c.chain)];
+      f.score2.push_back(joined(c.atom_score).cwiseAbs2());
+      f.norm2.push_back(joined(c.atom_norm));
+    }
+  }
+
+  /// Largest variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell.
+  double scatter(int chain, const Eigen::VectorXd& own_norm2) const {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(own_norm2.size()));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::sort(order.begin(), order.end(),
+              [&](Eigen::Index a, Eigen::Index b) { return own_norm2[a] > own_norm2[b]; });
+    std::vector<char> own(order.size(), 0);
+    double held = 0;
+    const double all = own_norm2.sum();
+    for (const Eigen::Index b : order) {
+      if (held >= kHeldByThem * all) break;
+      held += own_norm2[b];
+      own[static_cast<std::size_t>(b)] = 1;
+    }
+    double largest = 0;
+    const Functions& f = chains_[chain];
+    for (std::size_t k = 0; k < f.score2.size(); ++k) {
+      double score2 = 0, norm2 = 0;
+      int blocks = 0;
+      for (Eigen::Index b = 0; b < own_norm2.size(); ++b) {
+        if (own[static_cast<std::size_t>(b)] != 0 ||
+            there_[static_cast<std::size_t>(chain)][static_cast<std::size_t>(b)] == 0)
+          continue;
+        score2 += f.score2[k][b];
+        norm2 += f.norm2[k][b];
+        ++blocks;
+      }
+      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum())
+        largest = std::max(largest, score2 / norm2);
+    }
+    return largest;
+  }
+
+ private:
+  struct Functions {
+    std::vector<Eigen::VectorXd> score2, norm2;  // of blocks
+  };
+  Functions chains_[kChains];
+  std::vector<std::vector<char>> there_;  ///< by chain and block: has it rows there?
 };
 
 struct Done {
@@ -287,16 +351,15 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     return sum;
   };
   // Scatter of a score per unit of norm, and how many blocks carry it. A column that few blocks of its chain carry takes the
-  // largest scatter that any function of the signals has there: slow noise scatters slow columns most.
+  // largest scatter that any function of the signals has elsewhere: slow noise scatters slow columns most. Where there is too
+  // little elsewhere, nothing can be said of it.
   std::vector<double> units;
-  double high[kChains] = {1, 1, 1, 1}, chain_blocks[kChains] = {};
-  {
-    std::vector<std::vector<char>> seen(kChains, std::vector<char>(static_cast<std::size_t>(blocks), 0));
-    for (const Row& row : data.rows) seen[static_cast<std::size_t>(row.chain)][row.block] = 1;
-    for (int c = 0; c < kChains; ++c)
-      chain_blocks[c] = static_cast<double>(
-          std::count(seen[static_cast<std::size_t>(c)].begin(), seen[static_cast<std::size_t>(c)].end(), 1));
-  }
+  double chain_blocks[kChains] = {};
+  std::vector<std::vector<char>> seen(kChains, std::vector<char>(static_cast<std::size_t>(blocks), 0));
+  for (const Row& row : data.rows) seen[static_cast<std::size_t>(row.chain)][row.block] = 1;
+  for (int c = 0; c < kChains; ++c)
+    chain_blocks[c] = static_cast<double>(
+        std::count(seen[static_cast<std::size_t>(c)].begin(), seen[static_cast<std::size_t>(c)].end(), 1));
   const auto chains_of = [&](const Column& c) {
     return c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
                              : bit(c.chain);
@@ -309,22 +372,26 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     c.unit = scatter2 / c.norm2;
     c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
     if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
-    if (c.hypothesis < 0) high[static_cast<int>(c.chain)] = std::max(high[static_cast<int>(c.chain)], c.unit);
   }
   if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
   Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
   double rare = 0;
   std::size_t rare_columns = 0;
+  const Elsewhere elsewhere(result.columns, joined, std::move(seen));
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
     scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
-    double unit = 0, most = 0;
+    double most = 0;
     for (int chain = 0; chain < kChains; ++chain)
-      if ((chains_of(c) & (1U << chain)) != 0) {
-        unit = std::max(unit, high[chain]);
-        most = std::max(most, chain_blocks[chain]);
+      if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
+    if (c.norm2 > 0 && c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most) && c.hypothesis >= 0) {
+      const Eigen::VectorXd own = joined(c.atom_norm);
+      double unit = 1;
+      for (int chain = 0; chain < kChains; ++chain) {
+        if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
+        const double there = elsewhere.scatter(chain, own);
+        unit = std::max(unit, there > 0 ? there : std::numeric_limits<double>::infinity());
       }
-    if (c.norm2 > 0 && c.carried_by < kCarryingBlocks && most >= 2 * kCarryingBlocks && c.hypothesis >= 0) {
       c.rare_z = std::abs(c.score) / std::sqrt(unit * c.norm2);
       ++rare_columns;
     }

@@ -18,8 +18,8 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
-constexpr double kNestedLimit =
-    3.0;  // sigma that the parameters of a general case must earn beyond a simpler one
+// sigma that a general case must lead a simpler one by to stand first, and to stand beside it: chance alone passes the first in one of a hundred.
+constexpr double kNestedLimit = 0.75, kNestedDoubt = 0.2;
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
@@ -89,7 +89,7 @@ double correlation_seconds(const Prepared& data, const Eigen::VectorXd& residual
 
 class Search {
  public:
-  Search(const Predictor& predictor, const Library& library, Prepared& data, const ExplainOptions& options)
+  Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options)
       : predictor_(predictor), library_(library), data_(data), options_(options) {}
 
   Found run() {
@@ -101,6 +101,7 @@ class Search {
     for (const Row& row : data_.rows) ++rows_[static_cast<int>(row.chain)];
     choose_blocks(found_.baseline.residual);
     say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
+    place_slip(library_, data_, found_.baseline.residual);
     move_to(found_.baseline);
     forward();
     if (found_.added.size() > 1) swap_and_drop();
@@ -261,7 +262,25 @@ class Search {
     return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
   }
 
-  /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
+  /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none.
+  bool is_limit_case(const Trial& t) const {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+    for (int i = 0; i < h.info().parameter_count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const auto& parameter = h.info().parameters[i];
+      if (!h.free[k] || std::isfinite(parameter.null_value)) continue;
+      // The loss is flat there: a tenth is near enough.
+      const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
+                   high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
+      if (t.values[k] <= low || t.values[k] >= high) return true;
+      if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
+        return true;
+    }
+    return false;
+  }
+
+  /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped, and among twins
+  /// the one of fewer parameters stands first.
   void rank(std::vector<Trial>& trials, double unit) const {
     if (trials.empty()) return;
     const auto penalised = [&](const Trial& t) { return t.loss + 2 * unit * parameters_of(t); };
@@ -270,25 +289,19 @@ class Search {
     // The best reading of an effect speaks for it.
     std::set<std::string> seen;
     std::erase_if(trials, [&](const Trial& t) { return !seen.insert(id_of(t)).second; });
-    const auto mark = [&] {
-      const Trial& best = trials.front();
-      for (Trial& t : trials) {
-        t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
-        t.in_set = &t == &best || cannot_rule_out(t.behind);
-        t.material = size_over_floor(data_, found_.weights, found_.floors, t.residual - place_.residual);
-      }
-    };
-    mark();
+    mark(trials, unit);
     // Parsimony: a simpler case that is not ruled out stands for the general one.
     for (bool changed = true; changed;) {
       changed = false;
       for (std::size_t i = 1; i < trials.size(); ++i) {
-        if (!(trials[i].behind.t < kNestedLimit || trials[i].in_set) ||
-            !nests(id_of(trials[0]), id_of(trials[i])))
-          continue;
+        const bool twins = trials[i].behind.separation < kTwinLimit;
+        const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
+                             (trials[i].behind.t < kNestedLimit || twins || is_limit_case(trials[0]));
+        const bool fewer = twins && parameters_of(trials[i]) < parameters_of(trials[0]);
+        if (!simpler && !fewer) continue;
         std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                     trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-        mark();
+        mark(trials, unit);
         changed = true;
         break;
       }
@@ -296,11 +309,29 @@ class Search {
     for (Trial& t : trials)
       if (&t != &trials.front() && t.in_set)
         for (const Trial& simple : trials)
-          if (simple.in_set && nests(id_of(t), id_of(simple)) && t.behind.t > -kSetLimit) t.in_set = false;
+          if (simple.in_set && nests(id_of(t), id_of(simple)) &&
+              (t.behind.t > -kNestedDoubt || is_limit_case(t)))
+            t.in_set = false;
+    weigh(trials, unit);
+  }
+
+  /// Each against the first.
+  void mark(std::vector<Trial>& trials, double unit) const {
+    const Trial& best = trials.front();
+    for (Trial& t : trials) {
+      t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
+      t.in_set = &t == &best || cannot_rule_out(t.behind);
+      t.material = size_over_floor(data_, found_.weights, found_.floors, t.residual - place_.residual);
+    }
+  }
+
+  static void weigh(std::vector<Trial>& trials, double unit) {
     double sum = 0;
     for (Trial& t : trials) {
       const double c = std::max(t.behind.unit, unit);
-      t.weight = t.in_set ? std::exp(-0.5 * std::max(0.0, t.behind.delta) / c) : 0.0;
+      // Twins are equally likely: what lies between them is less than the data can tell.
+      const double behind = t.behind.separation < kTwinLimit ? 0.0 : std::max(0.0, t.behind.delta);
+      t.weight = t.in_set ? std::exp(-0.5 * behind / c) : 0.0;
       sum += t.weight;
     }
     for (Trial& t : trials) t.weight /= sum;
@@ -383,6 +414,7 @@ class Search {
                              step.gate.size));
       report(step.trials, step.screen.noise_unit);
       found_.adequate = !open;
+      if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
       bool take =
           open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
       if (take) {
@@ -400,6 +432,38 @@ class Search {
       found_.added.push_back(best.hypothesis);
       move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
     }
+  }
+
+  /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
+  bool another_leaves_nothing() {
+    std::vector<Trial>& trials = found_.steps.front().trials;
+    const Fit kept = found_.model;
+    const std::string first = id_of(trials.front());
+    int tried = 0;
+    for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
+      if (!cannot_rule_out(trials[i].behind) && !nests(id_of(trials[i]), first)) continue;
+      ++tried;
+      found_.added.back() = trials[i].hypothesis;
+      move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
+      Step rest = step_here();
+      if (rest.gate.significant && rest.gate.material &&
+          rest.gate.size >= kSmallRemainder * trials[i].material)
+        continue;
+      say(fmt::format("{} leaves nothing, {} does: it takes its place", id_of(trials[i]), first));
+      std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
+                  trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      const double unit = found_.steps.front().screen.noise_unit;
+      mark(trials, unit);
+      for (Trial& t : trials)
+        if (id_of(t) == first) t.in_set = false;
+      weigh(trials, unit);
+      found_.steps.push_back(std::move(rest));
+      found_.adequate = true;
+      return true;
+    }
+    found_.added.back() = trials.front().hypothesis;
+    move_to(kept);
+    return false;
   }
 
   Fit with(const std::vector<Trial>& effects) const {
@@ -451,7 +515,7 @@ class Search {
   }
 
   const Predictor& predictor_;
-  const Library& library_;
+  Library& library_;
   Prepared& data_;
   const ExplainOptions& options_;
   Found found_;
@@ -483,8 +547,7 @@ double size_over_floor(const Prepared& data, const Weights& weights, const Floor
   return best;
 }
 
-Found search(const Predictor& predictor, const Library& library, Prepared& data,
-             const ExplainOptions& options) {
+Found search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options) {
   return Search(predictor, library, data, options).run();
 }
 

@@ -60,7 +60,8 @@ struct Found {
   std::vector<TrialNote> notes;
 };
 
-[[nodiscard]] Found search(const Predictor& predictor, const Library& library, Prepared& data,
+/// `library` gains shapes that only the baseline's residual can tell.
+[[nodiscard]] Found search(const Predictor& predictor, Library& library, Prepared& data,
                            const ExplainOptions& options);
 
 /// rms over the floor, chain by chain, of what distinguishes two weighted residuals; the largest and where.
