@@ -19,6 +19,7 @@ namespace isac::explain {
 namespace {
 
 constexpr double kCarryingBlocks = 8;
+constexpr double kMimicked = 1e-5;  // of a response's squares left by the projection: all of it is mimicked
 // T cannot pass the square root of the blocks that carry a column: with fewer than these, and most of the chain elsewhere, it has
 // no power in a whole search.
 constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
@@ -224,7 +225,8 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       column.chain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] += x[i] * x[i];
     }
     column.norm2 = column.atom_norm.sum();
-    if (column.norm2 < 1e-12 * std::max(column.raw_norm2, 1e-300)) {  // all of it is mimicked
+    // A third of a percent of a response is how its column was low-passed, not what the effect does.
+    if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
       column.atom_score.setZero();
       column.norm2 = 0;
     }
