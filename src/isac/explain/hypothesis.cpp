@@ -249,7 +249,9 @@ unsigned chains_in(const Prepared& data) {
 }  // namespace
 
 int Hypothesis::parameters() const noexcept {
-  return static_cast<int>(std::count(free.begin(), free.end(), true));
+  // The moment of a slip is not refined, but it was chosen from the data.
+  const int chosen = clock == Clock::kDay && string_view(info().id) == "encoder_slip" ? 1 : 0;
+  return chosen + static_cast<int>(std::count(free.begin(), free.end(), true));
 }
 
 Values null_values(const Hypothesis& hypothesis, const Values& shape) {

@@ -18,85 +18,19 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
-// sigma that a general case must lead a simpler one by to stand first, and to stand beside it: chance alone passes the first in one of a hundred.
-constexpr double kNestedLimit = 0.75, kNestedDoubt = 0.2;
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
-
-Floors floors_of(const Prepared& data) {
-  Floors floors;
-  std::vector<const std::vector<double>*> torque, pressure;
-  for (const PreparedRun& run : data.runs) {
-    if (run.has_torque) torque.push_back(&run.torque);
-    for (const auto& p : run.raw_pressure)
-      if (!p.empty()) pressure.push_back(&p);
-  }
-  if (!torque.empty()) floors.white[0] = floors.white[3] = white_noise(torque);
-  if (!pressure.empty()) floors.white[1] = floors.white[2] = white_noise(pressure);
-  return floors;
-}
-
-/// Standard deviation of rows that is not slower than half a second: noise, with little of a missing effect in it.
-void reweight(const Predictor& predictor, const Fit& fit, Weights& weights) {
-  const Prepared& data = predictor.data();
-  for (int c = 0; c < kChains; ++c) {
-    std::vector<double> fast;
-    std::vector<double> piece;
-    unsigned run = ~0U;
-    const auto flush = [&] {
-      const auto window = static_cast<std::ptrdiff_t>(16);
-      double sum = 0;
-      for (std::ptrdiff_t k = 0; k < static_cast<std::ptrdiff_t>(piece.size()); ++k) {
-        sum += piece[static_cast<std::size_t>(k)];
-        if (k >= 2 * window) {
-          sum -= piece[static_cast<std::size_t>(k - 2 * window)];
-          fast.push_back(piece[static_cast<std::size_t>(k - window)] - sum / static_cast<double>(2 * window));
-        }
-      }
-      piece.clear();
-    };
-    for (std::size_t i = 0; i < data.rows.size(); ++i) {
-      if (static_cast<int>(data.rows[i].chain) != c) continue;
-      if (data.rows[i].run != run) flush();
-      run = data.rows[i].run;
-      piece.push_back(fit.residual[static_cast<Eigen::Index>(i)]);
-    }
-    flush();
-    const double spread = series::robust_deviation(fast);
-    if (spread > 0 && std::isfinite(spread)) weights.sigma[c] *= spread;
-  }
-  if (data.has(Chain::kPressure1))
-    weights.sigma[1] = weights.sigma[2] = std::max(weights.sigma[1], weights.sigma[2]);
-}
-
-double correlation_seconds(const Prepared& data, const Eigen::VectorXd& residual) {
-  double longest = 0;
-  for (const Chain chain : {Chain::kTorque, Chain::kMotion, Chain::kPressure1}) {
-    std::vector<std::vector<double>> pieces;
-    unsigned run = ~0U;
-    for (std::size_t i = 0; i < data.rows.size(); ++i) {
-      if (data.rows[i].chain != chain) continue;
-      if (data.rows[i].run != run) pieces.emplace_back();
-      run = data.rows[i].run;
-      pieces.back().push_back(residual[static_cast<Eigen::Index>(i)]);
-    }
-    if (pieces.empty()) continue;
-    const double spacing = data.runs.front().interval * data.stride * (chain == Chain::kPressure1 ? 2 : 1);
-    longest = std::max(longest, series::correlation_time(pieces) * spacing);
-  }
-  return longest;
-}
 
 class Search {
  public:
   Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options)
-      : predictor_(predictor), library_(library), data_(data), options_(options) {}
+      : predictor_(predictor), library_(library), data_(data), options_(options), ranking_(data, library) {}
 
   Found run() {
     found_.floors = floors_of(data_);
     first_weights();
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
-    reweight(predictor_, found_.baseline, found_.weights);
+    reweight(data_, found_.baseline, found_.weights);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     for (const Row& row : data_.rows) ++rows_[static_cast<int>(row.chain)];
     choose_blocks(found_.baseline.residual);
@@ -230,8 +164,20 @@ class Search {
     return list;
   }
 
+  bool a_tolerance_is_held() const {
+    for (std::size_t i = 0; i < found_.model.tolerances; ++i) {
+      const Active& a = found_.model.model.effects[i];
+      const double margin = 0.01 * (a.hypothesis->upper[0] - a.hypothesis->lower[0]);
+      if (a.values[0] < a.hypothesis->lower[0] + margin || a.values[0] > a.hypothesis->upper[0] - margin)
+        return true;
+    }
+    return false;
+  }
+
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const {
     std::vector<Trial> trials(list.size());
+    // A tolerance at its bound has stood in for what is missing as far as it may: with the effect beside it, it comes back.
+    const bool held = a_tolerance_is_held();
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
       for (std::size_t i = next++; i < list.size(); i = next++) {
@@ -242,10 +188,25 @@ class Search {
           Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
           if (other.loss < refined.loss) refined = std::move(other);
         }
+        if (held) {
+          Active active;
+          active.hypothesis = &h;
+          active.values = refined.values;
+          const Fit joint = refit(predictor_, found_.model, {active}, found_.weights, 6);
+          Eigen::VectorXd residual = place_.project(joint.residual);
+          const double loss = residual.squaredNorm();
+          if (loss < refined.loss) {
+            refined.values = joint.model.effects.back().values;
+            refined.residual = std::move(residual);
+            refined.loss = loss;
+          }
+        }
         trials[i].hypothesis = list[i].hypothesis;
         trials[i].values = refined.values;
         trials[i].residual = std::move(refined.residual);
         trials[i].loss = refined.loss;
+        trials[i].material =
+            size_over_floor(data_, found_.weights, found_.floors, trials[i].residual - place_.residual);
       }
     };
     std::vector<std::thread> pool;
@@ -253,88 +214,6 @@ class Search {
     work();
     for (std::thread& thread : pool) thread.join();
     return trials;
-  }
-
-  int parameters_of(const Trial& t) const {
-    return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].parameters();
-  }
-  std::string id_of(const Trial& t) const {
-    return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
-  }
-
-  /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none.
-  bool is_limit_case(const Trial& t) const {
-    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
-    for (int i = 0; i < h.info().parameter_count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const auto& parameter = h.info().parameters[i];
-      if (!h.free[k] || std::isfinite(parameter.null_value)) continue;
-      // The loss is flat there: a tenth is near enough.
-      const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
-                   high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
-      if (t.values[k] <= low || t.values[k] >= high) return true;
-      if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
-        return true;
-    }
-    return false;
-  }
-
-  /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped, and among twins
-  /// the one of fewer parameters stands first.
-  void rank(std::vector<Trial>& trials, double unit) const {
-    if (trials.empty()) return;
-    const auto penalised = [&](const Trial& t) { return t.loss + 2 * unit * parameters_of(t); };
-    std::stable_sort(trials.begin(), trials.end(),
-                     [&](const Trial& a, const Trial& b) { return penalised(a) < penalised(b); });
-    // The best reading of an effect speaks for it.
-    std::set<std::string> seen;
-    std::erase_if(trials, [&](const Trial& t) { return !seen.insert(id_of(t)).second; });
-    mark(trials, unit);
-    // Parsimony: a simpler case that is not ruled out stands for the general one.
-    for (bool changed = true; changed;) {
-      changed = false;
-      for (std::size_t i = 1; i < trials.size(); ++i) {
-        const bool twins = trials[i].behind.separation < kTwinLimit;
-        const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
-                             (trials[i].behind.t < kNestedLimit || twins || is_limit_case(trials[0]));
-        const bool fewer = twins && parameters_of(trials[i]) < parameters_of(trials[0]);
-        if (!simpler && !fewer) continue;
-        std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
-                    trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-        mark(trials, unit);
-        changed = true;
-        break;
-      }
-    }
-    for (Trial& t : trials)
-      if (&t != &trials.front() && t.in_set)
-        for (const Trial& simple : trials)
-          if (simple.in_set && nests(id_of(t), id_of(simple)) &&
-              (t.behind.t > -kNestedDoubt || is_limit_case(t)))
-            t.in_set = false;
-    weigh(trials, unit);
-  }
-
-  /// Each against the first.
-  void mark(std::vector<Trial>& trials, double unit) const {
-    const Trial& best = trials.front();
-    for (Trial& t : trials) {
-      t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
-      t.in_set = &t == &best || cannot_rule_out(t.behind);
-      t.material = size_over_floor(data_, found_.weights, found_.floors, t.residual - place_.residual);
-    }
-  }
-
-  static void weigh(std::vector<Trial>& trials, double unit) {
-    double sum = 0;
-    for (Trial& t : trials) {
-      const double c = std::max(t.behind.unit, unit);
-      // Twins are equally likely: what lies between them is less than the data can tell.
-      const double behind = t.behind.separation < kTwinLimit ? 0.0 : std::max(0.0, t.behind.delta);
-      t.weight = t.in_set ? std::exp(-0.5 * behind / c) : 0.0;
-      sum += t.weight;
-    }
-    for (Trial& t : trials) t.weight /= sum;
   }
 
   void report(const std::vector<Trial>& trials, double unit) {
@@ -345,10 +224,10 @@ class Search {
                                     (place_.residual.squaredNorm() - t.loss) / unit, t.material)
           : t.in_set
               ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
-                            id_of(best), t.behind.t, t.behind.separation)
-              : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, id_of(best));
-      found_.notes.push_back({id_of(t), sentence});
-      say(id_of(t) + ": " + sentence);
+                            ranking_.id_of(best), t.behind.t, t.behind.separation)
+              : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, ranking_.id_of(best));
+      found_.notes.push_back({ranking_.id_of(t), sentence});
+      say(ranking_.id_of(t) + ": " + sentence);
     }
   }
 
@@ -361,11 +240,11 @@ class Search {
     std::set<std::string> unphysical;
     std::erase_if(step.trials, [&](const Trial& t) {
       const bool wrong = is_unphysical(t);
-      if (wrong) unphysical.insert(id_of(t));
+      if (wrong) unphysical.insert(ranking_.id_of(t));
       return wrong;
     });
     if (!unphysical.empty()) step.gate = gate_of(step.screen, unphysical);
-    rank(step.trials, step.screen.noise_unit);
+    ranking_.rank(step.trials, step.screen.noise_unit);
     // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
     const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
     step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
@@ -438,10 +317,10 @@ class Search {
   bool another_leaves_nothing() {
     std::vector<Trial>& trials = found_.steps.front().trials;
     const Fit kept = found_.model;
-    const std::string first = id_of(trials.front());
+    const std::string first = ranking_.id_of(trials.front());
     int tried = 0;
     for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
-      if (!cannot_rule_out(trials[i].behind) && !nests(id_of(trials[i]), first)) continue;
+      if (!cannot_rule_out(trials[i].behind) && !nests(ranking_.id_of(trials[i]), first)) continue;
       ++tried;
       found_.added.back() = trials[i].hypothesis;
       move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
@@ -449,14 +328,14 @@ class Search {
       if (rest.gate.significant && rest.gate.material &&
           rest.gate.size >= kSmallRemainder * trials[i].material)
         continue;
-      say(fmt::format("{} leaves nothing, {} does: it takes its place", id_of(trials[i]), first));
+      say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       const double unit = found_.steps.front().screen.noise_unit;
-      mark(trials, unit);
+      ranking_.mark(trials, unit);
       for (Trial& t : trials)
-        if (id_of(t) == first) t.in_set = false;
-      weigh(trials, unit);
+        if (ranking_.id_of(t) == first) t.in_set = false;
+      Ranking::weigh(trials);
       found_.steps.push_back(std::move(rest));
       found_.adequate = true;
       return true;
@@ -487,13 +366,14 @@ class Search {
       move_to(with(others));
       Step step = step_here();
       if (step.trials.empty()) {
-        say(fmt::format("{} is not missed when it is dropped", id_of(chosen[i])));
+        say(fmt::format("{} is not missed when it is dropped", ranking_.id_of(chosen[i])));
         chosen = others;
         changed = true;
         continue;
       }
-      if (id_of(step.trials.front()) != id_of(chosen[i])) {
-        say(fmt::format("{} does better in place of {}", id_of(step.trials.front()), id_of(chosen[i])));
+      if (ranking_.id_of(step.trials.front()) != ranking_.id_of(chosen[i])) {
+        say(fmt::format("{} does better in place of {}", ranking_.id_of(step.trials.front()),
+                        ranking_.id_of(chosen[i])));
         changed = true;
       }
       chosen[i] = step.trials.front();
@@ -518,34 +398,13 @@ class Search {
   Library& library_;
   Prepared& data_;
   const ExplainOptions& options_;
+  Ranking ranking_;
   Found found_;
   Around place_;  ///< of found_.model
   std::size_t rows_[kChains] = {};
 };
 
 }  // namespace
-
-double size_over_floor(const Prepared& data, const Weights& weights, const Floors& floors,
-                       const Eigen::VectorXd& difference, Chain* where) {
-  double sum[kChains] = {}, best = 0;
-  std::size_t rows[kChains] = {};
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    const auto c = static_cast<std::size_t>(data.rows[i].chain);
-    sum[c] += difference[static_cast<Eigen::Index>(i)] * difference[static_cast<Eigen::Index>(i)];
-    ++rows[c];
-  }
-  for (int c = 0; c < kChains; ++c) {
-    if (rows[c] == 0) continue;
-    const double floor =
-        std::isfinite(floors.white[c]) ? std::max(floors.white[c], weights.sigma[c]) : weights.sigma[c];
-    const double size = std::sqrt(sum[c] / static_cast<double>(rows[c])) * weights.sigma[c] / floor;
-    if (size > best) {
-      best = size;
-      if (where != nullptr) *where = static_cast<Chain>(c);
-    }
-  }
-  return best;
-}
 
 Found search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options) {
   return Search(predictor, library, data, options).run();

@@ -11,27 +11,11 @@
 
 #include "isac/explain/compare.hpp"
 #include "isac/explain/explain.hpp"
+#include "isac/explain/floors.hpp"
+#include "isac/explain/ranking.hpp"
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
-
-struct Floors {
-  double white[kChains] = {kNotKnown, kNotKnown, kNotKnown,
-                           kNotKnown};  ///< of one sample at the recording's rate, N m or Pa
-  std::string from[kChains];
-};
-
-/// A candidate that was refitted beside what was there already.
-struct Trial {
-  int hypothesis = -1;
-  Values values{};
-  Eigen::VectorXd residual;  ///< weighted, all rows; of the refit, with the model's parameters eliminated
-  double loss = 0;
-  Comparison behind;    ///< of the best trial
-  double weight = 0;    ///< share of belief among the trials
-  double material = 0;  ///< rms of what it explains over the floor of the chain where it shows most
-  bool in_set = false;
-};
 
 struct Gate {
   bool significant = false, material = false;
@@ -63,9 +47,5 @@ struct Found {
 /// `library` gains shapes that only the baseline's residual can tell.
 [[nodiscard]] Found search(const Predictor& predictor, Library& library, Prepared& data,
                            const ExplainOptions& options);
-
-/// rms over the floor, chain by chain, of what distinguishes two weighted residuals; the largest and where.
-[[nodiscard]] double size_over_floor(const Prepared& data, const Weights& weights, const Floors& floors,
-                                     const Eigen::VectorXd& difference, Chain* where = nullptr);
 
 }  // namespace isac::explain

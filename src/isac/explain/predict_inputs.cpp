@@ -1,0 +1,249 @@
+// What enters the equations: the measured signals, freed of what the model says of their sensors.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "isac/explain/predict_parts.hpp"
+
+namespace isac::explain {
+namespace {
+
+using models::Hook;
+using models::JointPoint;
+
+constexpr int kInversions = 3;  // of a reading: the error after k of them is (relative change)^(k + 1)
+
+/// Cubic Hermite value of a low-passed signal and its derivative at a time between samples.
+double between(const std::vector<double>& x, const std::vector<double>& slope, double at, double dt) {
+  const double last = static_cast<double>(x.size() - 1);
+  at = std::clamp(at, 0.0, last);
+  const auto i = std::min(static_cast<std::size_t>(at), x.size() - 2);
+  const double s = at - static_cast<double>(i);
+  const double a = x[i], b = x[i + 1], da = slope[i] * dt, db = slope[i + 1] * dt;
+  return a + s * (da + s * (3 * (b - a) - 2 * da - db + s * (2 * (a - b) + da + db)));
+}
+
+double linear_between(const std::vector<double>& x, double at) {
+  at = std::clamp(at, 0.0, static_cast<double>(x.size() - 1));
+  const auto i = std::min(static_cast<std::size_t>(at), x.size() - 2);
+  const double s = at - static_cast<double>(i);
+  return (1 - s) * x[i] + s * x[i + 1];
+}
+
+/// A reading with play stands half the play behind the motion; while it stands still after a turn, the joint crosses the play,
+/// slowly at first.
+void undo_play(const std::vector<double>& velocity, double half, std::vector<double>& angle) {
+  double side = 0;
+  std::size_t moved = 0;  // the sample after the last one in motion
+  for (std::size_t k = 0; k < angle.size(); ++k) {
+    if (velocity[k] == 0) continue;
+    const double now = velocity[k] > 0 ? 1.0 : -1.0;
+    if (side == 0) side = now;  // where in its play it started is not known; from the first motion on it is
+    for (std::size_t i = moved; i < k; ++i) {
+      const double share = static_cast<double>(i - moved + 1) / static_cast<double>(k - moved + 1);
+      angle[i] += half * (side + (now - side) * share * share);
+    }
+    angle[k] += half * now;
+    side = now;
+    moved = k + 1;
+  }
+  for (std::size_t i = moved; i < angle.size(); ++i) angle[i] += half * side;
+}
+
+}  // namespace
+
+/// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot.
+void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const {
+  std::vector<const Active*> readings;
+  bool smooth = true;
+  for (const Active& a : model.effects) {
+    if (!a.hypothesis->reads_angle || a.hypothesis->info().hook == Hook::kDelay || is_null(a)) continue;
+    readings.push_back(&a);
+    smooth = smooth && a.hypothesis->info().linear;
+  }
+  const std::size_t n = run.raw_angle.size();
+  const double dt = run.interval;
+  std::vector<double> truth = smooth ? run.angle : run.raw_angle;
+  for (auto it = readings.rbegin(); it != readings.rend(); ++it) {  // the last first
+    const Hypothesis& h = *(*it)->hypothesis;
+    const double* q = (*it)->values.data();
+    if (h.info().state_count > 0) {
+      undo_play(run.dry_velocity, q[0], truth);
+      continue;
+    }
+    const std::vector<double> read = truth;
+    for (int round = 0; round < kInversions; ++round)
+      for (std::size_t k = 0; k < n; ++k) {
+        models::Readings<double> y;
+        y.angle = truth[k];
+        models::effect_reading(h.effect, q, time_of(h, run, k), static_cast<const double*>(nullptr), y);
+        truth[k] = read[k] - (y.angle - truth[k]);
+      }
+  }
+  const bool slow = !run.slow_acceleration.empty();
+  if (smooth) {
+    in.own_velocity = run.velocity;
+    in.own_acceleration = run.acceleration;
+    if (slow) in.own_slow_acceleration = run.slow_acceleration;
+    // φ_true = φ − δ with δ linear in φ and in t: the slopes of δ from two angles and two times.
+    double by_angle = 0, by_time = 0;
+    for (const Active* a : readings) {
+      const auto delta = [&](double angle, double time) {
+        models::Readings<double> y;
+        y.angle = angle;
+        models::effect_reading(a->hypothesis->effect, a->values.data(), time,
+                               static_cast<const double*>(nullptr), y);
+        return y.angle - angle;
+      };
+      by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
+      by_time += delta(0, 1) - delta(0, 0);
+    }
+    const double ratio = 1 / (1 + by_angle);
+    for (std::size_t k = 0; k < n; ++k) {
+      in.own_velocity[k] = (run.velocity[k] - by_time) * ratio;
+      in.own_acceleration[k] = run.acceleration[k] * ratio;
+      if (slow) in.own_slow_acceleration[k] = run.slow_acceleration[k] * ratio;
+    }
+    in.own_angle = std::move(truth);
+  } else {
+    const double sigma = data_->smoothing.torque / dt;
+    in.own_angle = low_pass(truth, sigma);
+    in.own_velocity = low_pass_derivative(truth, sigma, dt, 1);
+    in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
+    if (slow) in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
+  }
+  in.angle = &in.own_angle;
+  in.velocity = &in.own_velocity;
+  in.acceleration = &in.own_acceleration;
+  if (slow) in.slow_acceleration = &in.own_slow_acceleration;
+}
+
+/// Inputs of the last model on this run that changed them the same way: most models of a search differ elsewhere.
+std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
+                                                              std::size_t index) const {
+  std::vector<double> key;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (!(h.reads_angle || h.reads_pressure || h.info().hook == Hook::kMusclePressure) || is_null(a))
+      continue;
+    key.push_back(h.effect);
+    key.push_back(h.clock == Clock::kDay ? 1 : 0);
+    key.insert(key.end(), a.values.begin(), a.values.end());
+  }
+  struct Kept {
+    std::uint64_t predictor = 0;
+    std::vector<double> key;
+    std::shared_ptr<const Inputs> inputs;
+  };
+  thread_local std::vector<Kept> kept;
+  if (kept.size() <= index) kept.resize(index + 1);
+  Kept& k = kept[index];
+  if (k.inputs == nullptr || k.predictor != identity_ || k.key != key) {
+    k.inputs = make_inputs(model, index);
+    k.predictor = identity_;
+    k.key = std::move(key);
+  }
+  return k.inputs;
+}
+
+std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
+                                                                std::size_t index) const {
+  const PreparedRun& run = data_->runs[index];
+  auto shared = std::make_shared<Inputs>();
+  Inputs& in = *shared;
+  in.angle = &run.angle;
+  in.velocity = &run.velocity;
+  in.acceleration = &run.acceleration;
+  in.dry = &run.dry_velocity;
+  in.slow_acceleration = &run.slow_acceleration;
+  in.pressure[0] = &run.pressure[0];
+  in.pressure[1] = &run.pressure[1];
+  if (run.angle.empty()) return shared;
+  const double dt = run.interval;
+  double skew = 0;
+  bool angle = false;
+  for (const Active& a : model.effects) {
+    if (!a.hypothesis->reads_angle) continue;
+    if (a.hypothesis->info().hook == Hook::kDelay) {
+      skew += models::effect_delay(a.hypothesis->effect, a.values.data());
+    } else {
+      angle = angle || !is_null(a);
+    }
+  }
+  if (angle) undo_angle_readings(model, run, in);
+  if (skew != 0) {
+    const double shift = skew / dt;
+    const std::vector<double> angle_at = *in.angle, velocity_at = *in.velocity,
+                              acceleration_at = *in.acceleration, dry_at = *in.dry;
+    in.own_angle.resize(angle_at.size());
+    in.own_velocity.resize(angle_at.size());
+    in.own_acceleration.resize(angle_at.size());
+    in.own_dry.resize(angle_at.size());
+    for (std::size_t k = 0; k < angle_at.size(); ++k) {
+      const double at = static_cast<double>(k) + shift;
+      in.own_angle[k] = between(angle_at, velocity_at, at, dt);
+      in.own_velocity[k] = between(velocity_at, acceleration_at, at, dt);
+      in.own_acceleration[k] = linear_between(acceleration_at, at);
+      in.own_dry[k] = linear_between(dry_at, at);
+    }
+    in.angle = &in.own_angle;
+    in.velocity = &in.own_velocity;
+    in.acceleration = &in.own_acceleration;
+    in.dry = &in.own_dry;
+    if (!in.slow_acceleration->empty()) {
+      const std::vector<double> slow = *in.slow_acceleration;
+      in.own_slow_acceleration.resize(slow.size());
+      for (std::size_t k = 0; k < slow.size(); ++k)
+        in.own_slow_acceleration[k] = linear_between(slow, static_cast<double>(k) + shift);
+      in.slow_acceleration = &in.own_slow_acceleration;
+    }
+  }
+  for (const Active& a : model.effects) {
+    if (!run.has_pressure) break;
+    const auto& info = a.hypothesis->info();
+    const bool reading = a.hypothesis->reads_pressure;
+    if ((!reading && info.hook != Hook::kMusclePressure) || is_null(a)) continue;
+    const int e = a.hypothesis->effect;
+    for (int i = 0; i < 2; ++i)
+      if (in.own_pressure[i].empty()) in.own_pressure[i] = *in.pressure[i];
+    for (std::size_t k = 0; k < in.own_pressure[0].size(); ++k) {
+      double p[2] = {in.own_pressure[0][k], in.own_pressure[1][k]};
+      if (reading) {
+        double truth[2] = {p[0], p[1]};
+        for (int round = 0; round < kInversions; ++round) {
+          models::Readings<double> y;
+          y.pressure[0] = truth[0];
+          y.pressure[1] = truth[1];
+          models::effect_reading(e, a.values.data(), time_of(*a.hypothesis, run, k),
+                                 static_cast<const double*>(nullptr), y);
+          for (int i = 0; i < 2; ++i) truth[i] = p[i] - (y.pressure[i] - truth[i]);
+        }
+        p[0] = truth[0];
+        p[1] = truth[1];
+      } else {
+        models::effect_muscle_pressure(e, a.values.data(), p);
+      }
+      in.own_pressure[0][k] = p[0];
+      in.own_pressure[1][k] = p[1];
+    }
+    in.pressure[0] = &in.own_pressure[0];
+    in.pressure[1] = &in.own_pressure[1];
+  }
+  add_columns(index, in);
+  return shared;
+}
+
+/// The terms of the baseline at the rows of the torque chain, one after another, for unit parameters.
+void Predictor::add_columns(std::size_t index, Inputs& in) const {
+  const double one = 1;
+  in.columns.clear();
+  for (std::size_t i = data_->run_begin[index]; i < data_->run_begin[index + 1]; ++i) {
+    if (data_->rows[i].chain != Chain::kTorque) continue;
+    const JointPoint<double> x = point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration,
+                                          in.pressure, 0, data_->rows[i].sample);
+    for (std::size_t j = 0; j < terms_.size(); ++j)
+      in.columns.push_back(term_sign_[j] * models::effect_torque(terms_[j], &one, x));
+  }
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,141 @@
+// Pressures simulated from their commands, with the effects of the valve unit.
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "isac/explain/predict_parts.hpp"
+
+namespace isac::explain {
+
+using models::Hook;
+using models::Subsystem;
+
+void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
+                             std::vector<double> (&p)[2]) const {
+  const std::size_t n = run.time.size();
+  const double dt = run.interval;
+  const double gain = model.base[static_cast<std::size_t>(gain_)],
+               lag = model.base[static_cast<std::size_t>(lag_)];
+  struct Placed {
+    const Active* active;
+    double z[models::kMaxEffectStates];
+  };
+  std::vector<Placed> effects;
+  double delay = 0;
+  for (const Active& a : model.effects) {
+    const auto& info = a.hypothesis->info();
+    if (info.hook == Hook::kDelay && info.where == Subsystem::kPcu) {
+      delay += models::effect_delay(a.hypothesis->effect, a.values.data());
+    } else if (info.hook == Hook::kCommand || info.hook == Hook::kPressureRate) {
+      effects.push_back({&a, {}});
+    }
+  }
+  const double shift = delay / dt, whole = std::floor(shift), part = shift - whole;
+  const auto command = [&](int i, std::size_t k) {
+    const auto at = static_cast<std::ptrdiff_t>(k) - static_cast<std::ptrdiff_t>(whole);
+    const auto last = static_cast<std::ptrdiff_t>(n) - 1;
+    const auto& u = run.command[i];
+    return (1 - part) * u[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at, 0, last))] +
+           part * u[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at - 1, 0, last))];
+  };
+  models::ValvePoint<double> x;
+  x.lag = lag;
+  const auto rates = [&](const double(&u0)[2], const double(&state)[2], double velocity, double(&v)[2],
+                         double move) {
+    double u[2] = {gain * u0[0], gain * u0[1]};
+    x.pressure[0] = state[0];
+    x.pressure[1] = state[1];
+    x.velocity = velocity;
+    for (Placed& e : effects) {
+      x.command[0] = u[0];
+      x.command[1] = u[1];
+      models::effect_command(e.active->hypothesis->effect, e.active->values.data(), x, e.z, u);
+    }
+    for (int i = 0; i < 2; ++i) v[i] = (u[i] - state[i]) / lag;
+    for (const Placed& e : effects)
+      models::effect_pressure_rate(e.active->hypothesis->effect, e.active->values.data(), x, e.z, v);
+    if (!(move > 0)) return;
+    double again[2] = {gain * u0[0], gain * u0[1]};
+    for (Placed& e : effects) {
+      x.command[0] = again[0];
+      x.command[1] = again[1];
+      double f[2] = {}, g[2] = {};
+      const int effect = e.active->hypothesis->effect;
+      const double* q = e.active->values.data();
+      const int count = e.active->hypothesis->info().state_count;
+      if (count > 0) {
+        constexpr double kNudge = 1.0;  // Pa
+        double nudged[2] = {e.z[0] + kNudge, e.z[1] + kNudge};
+        models::effect_valve_derivative(effect, q, x, u, v, e.z, f);
+        models::effect_valve_derivative(effect, q, x, u, v, nudged, g);
+        models::effect_command(effect, q, x, e.z, again);
+        for (int i = 0; i < count; ++i) {
+          const double slope = (g[i] - f[i]) / kNudge * move;
+          e.z[i] += move * f[i] * growth(slope);
+        }
+      } else {
+        models::effect_command(effect, q, x, e.z, again);
+      }
+    }
+  };
+  p[0].resize(n);
+  p[1].resize(n);
+  double state[2] = {(*in.pressure[0])[0], (*in.pressure[1])[0]};
+  {
+    const double u0[2] = {command(0, 0), command(1, 0)};
+    double u[2] = {gain * u0[0], gain * u0[1]};
+    for (int i = 0; i < 2; ++i) x.pressure[i] = state[i];
+    for (Placed& e : effects) {
+      x.command[0] = u[0];
+      x.command[1] = u[1];
+      models::effect_valve_rest(e.active->hypothesis->effect, e.active->values.data(), x, e.z);
+      models::effect_command(e.active->hypothesis->effect, e.active->values.data(), x, e.z, u);
+    }
+  }
+  const bool moves = !run.velocity.empty();
+  const bool with_states = std::any_of(effects.begin(), effects.end(), [](const Placed& e) {
+    return e.active->hypothesis->info().state_count > 0 &&
+           e.active->hypothesis->info().id != std::string_view("valve_hysteresis");
+  });
+  const int substeps = with_states ? 4 : 1;
+  if (effects.empty()) {
+    // The same steps for the first-order lag alone, bit for bit.
+    for (std::size_t k = 0; k < n; ++k)
+      for (int i = 0; i < 2; ++i) {
+        p[i][k] = state[i];
+        const double u = gain * command(i, k), middle = state[i] + 0.5 * dt * ((u - state[i]) / lag);
+        state[i] += dt * ((u - middle) / lag);
+      }
+    return;
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    p[0][k] = state[0];
+    p[1][k] = state[1];
+    if (k + 1 == n) break;
+    const double u[2] = {command(0, k), command(1, k)};
+    {
+      // States that only step (play) see the command as the effects before them leave it.
+      double chain[2] = {gain * u[0], gain * u[1]};
+      x.pressure[0] = state[0];
+      x.pressure[1] = state[1];
+      for (Placed& e : effects) {
+        x.command[0] = chain[0];
+        x.command[1] = chain[1];
+        models::effect_valve_step(e.active->hypothesis->effect, e.active->values.data(), x, e.z);
+        models::effect_command(e.active->hypothesis->effect, e.active->values.data(), x, e.z, chain);
+      }
+    }
+    const double w = moves ? 0.5 * ((*in.velocity)[k] + (*in.velocity)[k + 1]) : 0.0;
+    // Midpoint rule; states move by half a step before its second half.
+    const double h = dt / substeps;
+    for (int sub = 0; sub < substeps; ++sub) {
+      double v[2], middle[2];
+      rates(u, state, w, v, with_states ? 0.5 * h : 0.0);
+      for (int i = 0; i < 2; ++i) middle[i] = state[i] + 0.5 * h * v[i];
+      rates(u, middle, w, v, with_states ? 0.5 * h : 0.0);
+      for (int i = 0; i < 2; ++i) state[i] += h * v[i];
+    }
+  }
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,162 @@
+// The torque of effects along the measured motion, and what sensors of the force make of it.
+#include <algorithm>
+#include <cmath>
+
+#include "isac/explain/predict_parts.hpp"
+
+namespace isac::explain {
+namespace {
+
+using models::Hook;
+using models::JointPoint;
+
+/// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
+/// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
+class Memory {
+ public:
+  Memory(const Active& active) : active_(active), count_(active.hypothesis->info().state_count) {}
+  void rest(const JointPoint<double>& x) {
+    models::effect_rest(active_.hypothesis->effect, active_.values.data(), x, z_);
+  }
+  const double* state() const { return z_; }
+  void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
+    JointPoint<double> middle = to;
+    middle.angle = 0.5 * (from.angle + to.angle);
+    middle.velocity = 0.5 * (from.velocity + to.velocity);
+    if (count_ == 1) {
+      // A state that slips at its limit must not run past it within a sample.
+      const double first = rate(middle, z_[0]);
+      if (first == 0) return;
+      const int parts =
+          active_.hypothesis->dry ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
+      const double h = dt / parts;
+      for (int part = 0; part < parts; ++part) {
+        const double f = part == 0 ? first : rate(middle, z_[0]);
+        constexpr double kNudge = 1e-6;
+        const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * h;
+        z_[0] += h * f * growth(std::min(slope, 5.0));
+      }
+      return;
+    }
+    const auto f = [&](const double* z, const JointPoint<double>& x, double* dz) {
+      models::effect_derivative(active_.hypothesis->effect, active_.values.data(), x, z, dz);
+    };
+    double k1[2], k2[2], k3[2], k4[2], y[2];
+    f(z_, from, k1);
+    for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k1[i];
+    f(y, middle, k2);
+    for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k2[i];
+    f(y, middle, k3);
+    for (int i = 0; i < 2; ++i) y[i] = z_[i] + dt * k3[i];
+    f(y, to, k4);
+    for (int i = 0; i < 2; ++i) z_[i] += dt / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
+  }
+
+ private:
+  double rate(const JointPoint<double>& x, double z) const {
+    double dz = 0;
+    models::effect_derivative(active_.hypothesis->effect, active_.values.data(), x, &z, &dz);
+    return dz;
+  }
+  const Active& active_;
+  int count_;
+  double z_[models::kMaxEffectStates] = {};
+};
+
+}  // namespace
+
+double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const {
+  const JointPoint<double> x =
+      point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
+  double torque = 0;
+  for (std::size_t j = 0; j < terms_.size(); ++j)
+    torque += term_sign_[j] * models::effect_torque(terms_[j], &model.base[j], x);
+  return torque;
+}
+
+std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run,
+                                                 const Inputs& in, bool motion) const {
+  const bool seed = data_->baseline.terms.empty();
+  std::vector<double> sum;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (h.info().hook != Hook::kTorque) continue;
+    if (seed && (h.seen_by == SeenBy::kMotionOnly) != motion) continue;
+    if (is_null(a)) continue;
+    if (sum.empty()) sum.assign(run.time.size(), 0.0);
+    const double sign = data_->baseline.driven ? -1.0 : 1.0;
+    const double stiffness = stiffness_ >= 0 ? model.base[static_cast<std::size_t>(stiffness_)] : 0.0;
+    const double gain = pressure_gain_ >= 0 ? model.base[static_cast<std::size_t>(pressure_gain_)] : 0.0;
+    const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
+    const std::vector<double>& acceleration = motion ? *in.slow_acceleration : *in.acceleration;
+    const auto at = [&](std::size_t k) {
+      return point_at(data_->rig, stiffness, gain, *in.angle, velocity, acceleration, in.pressure,
+                      time_of(h, run, k), k);
+    };
+    JointPoint<double> x = at(0);
+    if (h.info().state_count == 0) {
+      for (std::size_t k = 0; k < sum.size(); ++k)
+        sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k));
+      continue;
+    }
+    Memory memory(a);
+    memory.rest(x);
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      const JointPoint<double> next = k == 0 ? x : at(k);
+      if (k > 0) memory.step(x, next, run.interval);
+      x = next;
+      sum[k] += sign * models::effect_torque(h.effect, a.values.data(), x, memory.state());
+    }
+  }
+  return sum;
+}
+
+/// What sensors of the force make of a torque: added to `change`. The forces are half of the torque on either side of their
+/// measured sum, whose noise is not that of the torque; where a reading is clipped, what the other sensor leaves for it.
+void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
+                            const std::vector<double>& torque, std::vector<double>& change) const {
+  if (run.force[0].empty()) return;
+  const double r = data_->rig.wheel_radius;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (!h.reads_force || is_null(a)) continue;
+    double z[models::kMaxEffectStates] = {};
+    const bool memory = h.info().state_count > 0, clips = !h.amplitude[0];
+    double last[2] = {0, 0};
+    for (std::size_t k = 0; k < torque.size(); ++k) {
+      models::Readings<double> y;
+      const double load = (torque[k] + change[k]) / r;
+      if (clips) {
+        y.force[0] = run.force[1][k] - load;
+        y.force[1] = run.force[0][k] + load;
+      } else {
+        const double common = memory ? 0.0 : 0.5 * (run.force[0][k] + run.force[1][k]);
+        y.force[0] = common - 0.5 * load;
+        y.force[1] = common + 0.5 * load;
+      }
+      const double before[2] = {y.force[0], y.force[1]};
+      if (memory) {
+        if (k == 0) {
+          models::effect_reading_rest(h.effect, a.values.data(), y, z);
+        } else {
+          // First-order in its state: exponential step on the mean input of the sample.
+          models::Readings<double> middle = y;
+          for (int i = 0; i < 2; ++i) middle.force[i] = 0.5 * (last[i] + before[i]);
+          double f[2] = {}, g[2] = {}, nudged[2] = {z[0] + 1e-6, z[1] + 1e-6};
+          models::effect_reading_derivative(h.effect, a.values.data(), middle, z, f);
+          models::effect_reading_derivative(h.effect, a.values.data(), middle, nudged, g);
+          for (int i = 0; i < 2; ++i) {
+            const double slope = (g[i] - f[i]) / 1e-6 * run.interval;
+            z[i] += run.interval * f[i] * growth(slope);
+          }
+        }
+        last[0] = before[0];
+        last[1] = before[1];
+      }
+      models::effect_reading(h.effect, a.values.data(), time_of(h, run, k), memory ? z : nullptr, y);
+      change[k] += r * ((y.force[1] - before[1]) - (y.force[0] - before[0]));
+    }
+  }
+}
+
+}  // namespace isac::explain

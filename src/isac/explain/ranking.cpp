@@ -1,0 +1,96 @@
+#include "isac/explain/ranking.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string_view>
+
+namespace isac::explain {
+namespace {
+
+// Sigma that a general case must lead a simpler one by to stand first, and to stand beside it: chance alone passes the first in
+// one of a hundred.
+constexpr double kNestedLimit = 0.75, kNestedDoubt = 0.2;
+
+}  // namespace
+
+int Ranking::parameters_of(const Trial& t) const {
+  return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].parameters();
+}
+std::string Ranking::id_of(const Trial& t) const {
+  return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
+}
+
+bool Ranking::is_limit_case(const Trial& t) const {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  for (int i = 0; i < h.info().parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const auto& parameter = h.info().parameters[i];
+    if (!h.free[k] || std::isfinite(parameter.null_value)) continue;
+    // The loss is flat there: a tenth is near enough.
+    const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
+                 high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
+    if (t.values[k] <= low || t.values[k] >= high) return true;
+    if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
+      return true;
+  }
+  return false;
+}
+
+void Ranking::rank(std::vector<Trial>& trials, double unit) const {
+  if (trials.empty()) return;
+  const auto penalised = [&](const Trial& t) { return t.loss + 2 * unit * parameters_of(t); };
+  std::stable_sort(trials.begin(), trials.end(),
+                   [&](const Trial& a, const Trial& b) { return penalised(a) < penalised(b); });
+  // The best reading of an effect speaks for it.
+  std::set<std::string> seen;
+  std::erase_if(trials, [&](const Trial& t) { return !seen.insert(id_of(t)).second; });
+  mark(trials, unit);
+  // Parsimony: a simpler case that is not ruled out stands for the general one.
+  std::size_t changes = 0;  // two that each stand for the other must not take turns for ever
+  for (bool changed = true; changed && changes < trials.size();) {
+    changed = false;
+    for (std::size_t i = 1; i < trials.size(); ++i) {
+      const bool twins = trials[i].behind.separation < kTwinLimit;
+      const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
+                           (trials[i].behind.t < kNestedLimit || twins || is_limit_case(trials[0]));
+      const bool fewer = twins && parameters_of(trials[i]) < parameters_of(trials[0]);
+      if (!simpler && !fewer) continue;
+      std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
+                  trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      mark(trials, unit);
+      changed = true;
+      ++changes;
+      break;
+    }
+  }
+  for (Trial& t : trials)
+    if (&t != &trials.front() && t.in_set)
+      for (const Trial& simple : trials)
+        if (simple.in_set && nests(id_of(t), id_of(simple)) &&
+            (t.behind.t > -kNestedDoubt || is_limit_case(t)))
+          t.in_set = false;
+  weigh(trials);
+}
+
+void Ranking::mark(std::vector<Trial>& trials, double unit) const {
+  const Trial& best = trials.front();
+  for (Trial& t : trials) {
+    t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
+    t.in_set = &t == &best || cannot_rule_out(t.behind);
+  }
+}
+
+void Ranking::weigh(std::vector<Trial>& trials) {
+  double sum = 0;
+  for (Trial& t : trials) {
+    // Twins are equally likely: what lies between them is less than the data can tell. Others as often as noise would put the
+    // truth so far behind.
+    const double behind = t.behind.separation < kTwinLimit ? 0.0 : std::max(0.0, t.behind.t);
+    t.weight = t.in_set ? std::exp(-0.5 * behind * behind) : 0.0;
+    sum += t.weight;
+  }
+  for (Trial& t : trials) t.weight /= sum;
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,53 @@
+/// @file
+/// Which of the refitted candidates stands first, which the data cannot rule out, and how belief is shared among them.
+///
+///   t = Δ/(2 √(c |d|²)),  d the difference of two residuals, Δ that of their losses with 2 c for each surplus parameter
+///
+/// The best fit stands first, but a simpler effect that it contains stands for it unless it leads clearly, or where its own shape
+/// says that it has become the simpler one; among twins (less than 3 sigma of data between them) the one of fewer parameters.
+/// Threads: const members may be called from many threads. Errors: none. Source: docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "isac/explain/compare.hpp"
+#include "isac/explain/floors.hpp"
+
+namespace isac::explain {
+
+/// A candidate that was refitted beside what was there already.
+struct Trial {
+  int hypothesis = -1;
+  Values values{};
+  Eigen::VectorXd residual;  ///< weighted, all rows; of the refit, with the model's parameters eliminated
+  double loss = 0;
+  Comparison behind;    ///< of the best trial
+  double weight = 0;    ///< share of belief among the trials
+  double material = 0;  ///< rms of what it explains over the floor of the chain where it shows most
+  bool in_set = false;
+};
+
+class Ranking {
+ public:
+  Ranking(const Prepared& data, const Library& library) : data_(data), library_(library) {}
+
+  [[nodiscard]] int parameters_of(const Trial& trial) const;
+  [[nodiscard]] std::string id_of(const Trial& trial) const;
+  /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none.
+  [[nodiscard]] bool is_limit_case(const Trial& trial) const;
+  /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped. `unit`: variance
+  /// of a score per unit of norm.
+  void rank(std::vector<Trial>& trials, double unit) const;
+  /// Each against the first.
+  void mark(std::vector<Trial>& trials, double unit) const;
+  /// Shares of belief among those in the set.
+  static void weigh(std::vector<Trial>& trials);
+
+ private:
+  const Prepared& data_;
+  const Library& library_;
+};
+
+}  // namespace isac::explain
