@@ -31,7 +31,7 @@ TEST(NextExperiment, needs_at_most_a_third_of_the_seconds_that_random_runs_need)
                         {"valve_deadband", "valve_hysteresis", true},
                         {"asymmetric_fill_vent", "flow_limit", true},
                         {"stribeck_friction", "coulomb_friction", false},
-                        {"leak", "pressure_gain_error", true},
+                        {"volume_coupling", "second_order_lag", false},
                         {"thermal_drift", "force_drift", false}};
   double ours_sum = 0, random_sum = 0, log_ratio = 0;
   int counted = 0;
