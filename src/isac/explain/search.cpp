@@ -119,11 +119,12 @@ class Search {
         gate.what = what;
       }
     };
+    // The first effect's own size is told by its refit; what is left beside one casts doubt already by its linear response.
     for (const Screened& c : s.candidates)
       if (c.gain > 0 && significant(c, s) &&
           ignored.count(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()) == 0)
         consider(c.gain, c.chain_share, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
-                 c.T >= s.limit);
+                 !found_.added.empty() && c.T >= s.limit);
     for (const Column& c : s.columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
       double share[kChains] = {};

@@ -24,7 +24,7 @@ struct Gate {
   Chain chain = Chain::kTorque;
   std::string what;  ///< whose response that is
   double dense_size =
-      0;  ///< of the largest that shows throughout its chain, so that flips of blocks speak for it
+      0;  ///< of the largest generic function (beside an effect: response too) that flips of blocks speak for
 };
 
 struct Step {
