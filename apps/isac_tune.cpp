@@ -37,7 +37,7 @@ struct Words {
               hold = "1.5 s";
   std::string longest = "120 s";
   double rate = 1000, uncertainty = 3, overshoot = 10, modulus = 0.5, share = 95, least_integral = 0.1;
-  int cycles = 10, rounds = 4, draws = 200;
+  int cycles = 10, rounds = 3, draws = 200;
   std::uint64_t seed = 1;
   bool rate_given = false;
 };

@@ -14,7 +14,7 @@ namespace isac::tune {
 struct StepSettings {
   double height = 0;  ///< Pa
   double hold = 1.5;  ///< s, of each step: nine lags of the seed's valve unit
-  int rounds = 4;     ///< of four steps and the short ones
+  int rounds = 3;     ///< of four steps and the short ones
 };
 
 class StepSeries final : public Experiment {
