@@ -4,9 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isac/explain/experiment.hpp"
@@ -106,5 +110,32 @@ struct Bench {
     return out;
   }
 };
+
+/// Seconds that runs drawn at random, each as long as one of the proposed, need for as much; the mean of `draws` such days.
+inline double random_seconds(const explain::Designer& designer, const explain::NextExperiment& next,
+                             double target, int draws) {
+  constexpr double kGivenUp = 1200;  // s: random runs that need longer count as if they were done then
+  double ours = 0;
+  for (const explain::PlannedRun& run : next.runs) ours += run.seconds;
+  const double each = ours / static_cast<double>(next.runs.size());
+  std::vector<std::pair<double, explain::Designer::Information>> pool;
+  for (explain::PlannedRun run : designer.candidates()) {
+    run.seconds = std::max(each, explain::least_seconds(run));
+    if (auto gram = designer.information(run)) pool.emplace_back(run.seconds, std::move(*gram));
+  }
+  std::mt19937 random(7);
+  double mean = 0;
+  for (int draw = 0; draw < draws; ++draw) {
+    explain::Designer::Information sum = designer.recorded();
+    double seconds = 0;
+    while (seconds < kGivenUp && designer.separation(sum, 0, 1) < target) {
+      const auto& one = pool[random() % pool.size()];
+      sum += one.second;
+      seconds += one.first;
+    }
+    mean += seconds / draws;
+  }
+  return mean;
+}
 
 }  // namespace isac::test

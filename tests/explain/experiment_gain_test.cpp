@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <random>
 
 #include "experiment_bench.hpp"
 #include "isac/explain/experiment.hpp"
@@ -53,26 +52,7 @@ TEST(NextExperiment, needs_at_most_a_third_of_the_seconds_that_random_runs_need)
     const double target = std::min(options.wanted, next.separation_expected);
     double ours = 0;
     for (const PlannedRun& run : next.runs) ours += run.seconds;
-    const double each = ours / static_cast<double>(next.runs.size());
-    std::vector<std::pair<double, Designer::Information>> pool;
-    for (PlannedRun run : designer.candidates()) {
-      run.seconds = std::max(each, least_seconds(run));
-      if (auto gram = designer.information(run)) pool.emplace_back(run.seconds, std::move(*gram));
-    }
-    std::mt19937 random(7);
-    double mean = 0;
-    constexpr int kDraws = 200;
-    constexpr double kGivenUp = 1200;  // s: random runs that need longer count as if they were done then
-    for (int draw = 0; draw < kDraws; ++draw) {
-      Designer::Information sum = designer.recorded();
-      double seconds = 0;
-      while (seconds < kGivenUp && designer.separation(sum, 0, 1) < target) {
-        const auto& one = pool[random() % pool.size()];
-        sum += one.second;
-        seconds += one.first;
-      }
-      mean += seconds / kDraws;
-    }
+    const double mean = test::random_seconds(designer, next, target, 200);
     std::printf("%-28s %-22s now %.1f, then %.1f; ours %.0f s, random %.0f s: %s\n", pair.truth, pair.rival,
                 now, next.separation_expected, ours, mean, next.sentence.c_str());
     ours_sum += ours;

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdio>
 #include <map>
-#include <random>
 #include <set>
 #include <sstream>
 
@@ -23,7 +22,6 @@ using test::TiedRig;
 constexpr double kShows = 8;  // sigma by which the true effect shows beside a refitted baseline
 constexpr double kTied = 3;   // sigma below which two effects are tied
 constexpr int kDraws = 100;
-constexpr double kGivenUp = 1200;  // s: random runs that need longer count as if they were done then
 
 struct Row {
   std::string truth, rival, recordings, sentence;
@@ -39,30 +37,6 @@ std::vector<std::string> rivals_of(const Hypothesis& h) {
     ids.push_back(word);
   }
   return ids;
-}
-
-double random_seconds(const Designer& designer, const NextExperiment& next, double target) {
-  double ours = 0;
-  for (const PlannedRun& run : next.runs) ours += run.seconds;
-  const double each = ours / static_cast<double>(next.runs.size());
-  std::vector<std::pair<double, Designer::Information>> pool;
-  for (PlannedRun run : designer.candidates()) {
-    run.seconds = std::max(each, least_seconds(run));
-    if (auto gram = designer.information(run)) pool.emplace_back(run.seconds, std::move(*gram));
-  }
-  std::mt19937 random(7);
-  double mean = 0;
-  for (int draw = 0; draw < kDraws; ++draw) {
-    Designer::Information sum = designer.recorded();
-    double seconds = 0;
-    while (seconds < kGivenUp && designer.separation(sum, 0, 1) < target) {
-      const auto& one = pool[random() % pool.size()];
-      sum += one.second;
-      seconds += one.first;
-    }
-    mean += seconds / kDraws;
-  }
-  return mean;
 }
 
 TEST(NextExperiment, settles_nine_ties_in_ten_in_a_third_of_the_seconds_of_random_runs) {
@@ -105,7 +79,7 @@ TEST(NextExperiment, settles_nine_ties_in_ten_in_a_third_of_the_seconds_of_rando
         hardware.erase({row.truth, row.rival});
         hardware.erase({row.rival, row.truth});
         for (const PlannedRun& run : next.runs) row.ours += run.seconds;
-        row.random = random_seconds(designer, next, std::min(options.wanted, row.then));
+        row.random = test::random_seconds(designer, next, std::min(options.wanted, row.then), kDraws);
         settled.push_back(row);
       }
     }

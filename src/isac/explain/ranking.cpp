@@ -9,7 +9,7 @@ namespace isac::explain {
 namespace {
 
 // Sigma that a general case must lead a simpler one by to stand first, and to stand beside it: chance alone passes the first in
-// one of a hundred.
+// two of a hundred.
 constexpr double kNestedLimit = 0.75, kNestedDoubt = 0.2;
 
 }  // namespace
