@@ -1,6 +1,7 @@
 #include "baseline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace blind {
@@ -45,43 +46,50 @@ struct Powers {
   double pp = 0, pg = 0, gg = 0;
 };
 
-/// What unit lags of T_C leave of the pressures, K_C being the best: pp − pg²/gg.
-Powers pressure_powers(const std::vector<RunPlan>& runs, const std::vector<Signals>& signals, double T_C) {
-  Powers sum;
+/// What unit lags of each T_C leave of the pressures, K_C being the best: pp − pg²/gg. Several in one pass, because each
+/// is a chain of additions that waits for itself.
+template <std::size_t kCount>
+std::array<Powers, kCount> pressure_powers(const std::vector<RunPlan>& runs,
+                                           const std::vector<Signals>& signals,
+                                           const std::array<double, kCount>& T_C) {
+  double share[kCount], pg[kCount] = {}, gg[kCount] = {}, g[kCount], pp = 0.0;
+  for (std::size_t j = 0; j < kCount; ++j) share[j] = 1.0 - std::exp(-kRowTime / T_C[j]);
   for (std::size_t i = 0; i < runs.size(); ++i) {
     if (runs[i].heldout) continue;
-    const double share = 1.0 - std::exp(-kRowTime / T_C);
     for (int valve = 0; valve < 2; ++valve) {
       const auto& u = valve == 0 ? runs[i].command_1 : runs[i].command_2;
       const auto& p = valve == 0 ? signals[i].p1 : signals[i].p2;
-      double g = u.front();
+      std::fill(g, g + kCount, u.front());
       for (std::size_t k = 0; k < u.size(); ++k) {
-        sum.pp += p[k] * p[k];
-        sum.pg += p[k] * g;
-        sum.gg += g * g;
-        g += share * (u[k] - g);
+        pp += p[k] * p[k];
+        for (std::size_t j = 0; j < kCount; ++j) {
+          pg[j] += p[k] * g[j];
+          gg[j] += g[j] * g[j];
+          g[j] += share[j] * (u[k] - g[j]);
+        }
       }
     }
   }
-  return sum;
+  std::array<Powers, kCount> sums;
+  for (std::size_t j = 0; j < kCount; ++j) sums[j] = {pp, pg[j], gg[j]};
+  return sums;
 }
 
 void fit_valves(Baseline& base, const Rig& rig, const std::vector<RunPlan>& runs,
                 const std::vector<Signals>& signals) {
-  const auto left = [&](double T_C) {
-    const Powers s = pressure_powers(runs, signals, T_C);
-    return s.pp - s.pg * s.pg / s.gg;
-  };
+  const auto left = [](const Powers& s) { return s.pp - s.pg * s.pg / s.gg; };
   // The lowest point of a parabola through three points, three times, each time closer.
   double T = rig.T_C, width = 0.1;
   for (int round = 0; round < 4; ++round) {
-    const double a = left(T * (1.0 - width)), b = left(T), c = left(T * (1.0 + width));
+    const std::array<Powers, 3> at =
+        pressure_powers<3>(runs, signals, {T * (1.0 - width), T, T * (1.0 + width)});
+    const double a = left(at[0]), b = left(at[1]), c = left(at[2]);
     const double bend = a - 2.0 * b + c;
     const double move = bend > 0.0 ? 0.5 * (a - c) / bend : (a < c ? -1.0 : 1.0);
     T *= 1.0 + width * std::clamp(move, -3.0, 3.0);
     if (std::abs(move) < 1.0) width *= 0.3;
   }
-  const Powers s = pressure_powers(runs, signals, T);
+  const Powers s = pressure_powers<1>(runs, signals, {T})[0];
   base.T_C = T;
   base.K_C = s.pg / s.gg;
 }

@@ -3,20 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "known_runs.hpp"
 #include "plant.hpp"
 
 namespace blind {
 namespace {
 
 constexpr double kSeekStep = 5e-4;  // s, of the integrator while a strength is sought
-
-std::vector<Signals> simulate_runs(const Rig& rig, const std::vector<RunPlan>& runs, const Hidden& hidden,
-                                   double step, bool heldout_too) {
-  std::vector<Signals> signals(runs.size());
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    if (heldout_too || !runs[i].heldout) signals[i] = simulate(rig, runs[i], hidden, step);
-  return signals;
-}
 
 /// A step in time happens between two runs, where hands are on the rig; at least two fitted runs lie on each side.
 void snap_to_rest(Shape& shape, const std::vector<RunPlan>& runs) {
@@ -41,11 +34,14 @@ Strength strength_of(const Gap& gap, const Noise& noise, const Rig& rig) {
 }
 
 Hiding hide(const Effect& effect, const Shape& shape, const Dataset& dataset, double ratio) {
+  KnownRuns known(dataset.rig, dataset.runs, kSeekStep);
+  std::vector<Signals> signals(dataset.runs.size());
   const auto reached = [&](double amplitude) {
     Hidden hidden;
     hidden.seed = dataset.request.seed;
     effect.apply(hidden, amplitude, shape);
-    const auto signals = simulate_runs(dataset.rig, dataset.runs, hidden, kSeekStep, false);
+    for (std::size_t i = 0; i < signals.size(); ++i)
+      if (!dataset.runs[i].heldout) signals[i] = known.simulated(i, hidden);
     const Baseline base = fit_baseline(dataset.rig, dataset.runs, signals);
     return strength_of(gap_of(dataset.rig, base, dataset.runs, signals, false), dataset.noise, dataset.rig);
   };
@@ -98,7 +94,7 @@ Dataset make_dataset(const Request& request) {
   }
   d.hidden.seed = request.seed;
   if (!d.not_testable.empty()) return d;
-  d.clean = simulate_runs(d.rig, d.runs, d.hidden, kWrittenStep, true);
+  for (const RunPlan& run : d.runs) d.clean.push_back(simulate(d.rig, run, d.hidden, kWrittenStep));
   d.base = fit_baseline(d.rig, d.runs, d.clean);
   d.gap = gap_of(d.rig, d.base, d.runs, d.clean, false);
   d.heldout_gap = gap_of(d.rig, d.base, d.runs, d.clean, true);

@@ -1,5 +1,6 @@
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <stdexcept>
 
@@ -8,10 +9,36 @@
 namespace blind {
 namespace {
 
+constexpr std::size_t kCell = 40;  // characters that a number may need
+
+/// Writes x with `digits` decimals (at most 9) to `at`, as std::to_chars does, and returns the end. Millions of cells are
+/// written for a dataset: where the rounding is beyond doubt, the digits come from an integer.
+char* put(char* at, double x, int digits) {
+  constexpr double kTens[] = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9};
+  const double scaled = std::abs(x) * kTens[digits];
+  if (!(scaled < 1e12)) return std::to_chars(at, at + kCell, x, std::chars_format::fixed, digits).ptr;
+  auto whole = static_cast<std::uint64_t>(scaled);
+  const double rest = scaled - static_cast<double>(whole);
+  // The product is off by at most 6e-5 (half a last place below 1e12), so only next to a half could it mislead.
+  if (std::abs(rest - 0.5) < 1e-3)
+    return std::to_chars(at, at + kCell, x, std::chars_format::fixed, digits).ptr;
+  if (rest > 0.5) ++whole;
+  char backwards[kCell];
+  int count = 0;
+  for (; count < digits; whole /= 10) backwards[count++] = static_cast<char>('0' + whole % 10);
+  if (digits > 0) backwards[count++] = '.';
+  do {
+    backwards[count++] = static_cast<char>('0' + whole % 10);
+    whole /= 10;
+  } while (whole > 0);
+  if (std::signbit(x)) *at++ = '-';
+  while (count > 0) *at++ = backwards[--count];
+  return at;
+}
+
 void put(std::string& text, double x, int digits) {
-  char buffer[40];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, x, std::chars_format::fixed, digits);
-  text.append(buffer, end.ptr);
+  char cell[kCell];
+  text.append(cell, put(cell, x, digits));
 }
 
 /// Seconds of the day as hh:mm:ss, from nine in the morning on.
@@ -47,15 +74,17 @@ std::string csv(const RunPlan& run, const Signals& s, bool jitter, Random& rando
   text.reserve(text.size() + s.angle.size() * 80);
   for (std::size_t k = 0; k < s.angle.size(); ++k) {
     const double t = static_cast<double>(k) * kRowTime;
-    put(text, jitter ? t + 5e-6 * (random.normal() + 4.0) : t, 6);
+    char line[8 * (kCell + 1)];
+    char* at = put(line, jitter ? t + 5e-6 * (random.normal() + 4.0) : t, 6);
     const double cells[] = {s.angle[k],       s.p1[k], s.p2[k], run.command_1[k],
                             run.command_2[k], s.F1[k], s.F2[k]};
     const int digits[] = {8, 6, 6, 5, 5, 4, 4};
     for (int i = 0; i < 7; ++i) {
-      text += ',';
-      put(text, cells[i], digits[i]);
+      *at++ = ',';
+      at = put(at, cells[i], digits[i]);
     }
-    text += '\n';
+    *at++ = '\n';
+    text.append(line, at);
   }
   return text;
 }

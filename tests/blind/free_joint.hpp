@@ -18,6 +18,7 @@ class Joint {
   Joint(const Rig& rig, const Hidden& h, const Muscles& muscles, double angle)
       : h_(h), muscles_(muscles), angle_(angle), far_angle_(angle) {
     inertia_ = rig.inertia + h.added_inertia;
+    alone_ = h.quadratic_damping == 0 && h.gravity == 0 && h.stop_stiffness == 0 && h.compliance == 0;
     if (h.compliance != 0) {
       far_inertia_ = inertia_ * h.second_share;
       inertia_ -= far_inertia_;
@@ -75,6 +76,7 @@ class Joint {
   };
 
   [[nodiscard]] double others(double phi, double w, double far_phi, double far_w) const {
+    if (alone_) return 0.0;
     double T = -h_.quadratic_damping * w * std::abs(w);
     if (h_.gravity != 0) T -= h_.gravity * std::sin(phi + h_.gravity_angle);
     if (h_.stop_stiffness != 0) {
@@ -127,6 +129,7 @@ class Joint {
 
   const Hidden& h_;
   const Muscles& muscles_;
+  bool alone_ = true;  ///< nothing but muscles and bearing acts on the joint
   double inertia_ = 1, far_inertia_ = 0, stiffness_ = 0, damping_ = 0;
   double angle_, speed_ = 0, far_angle_, far_speed_ = 0;
 };

@@ -79,6 +79,12 @@ struct Hidden {
   double step_stiffness = 0, step_from = 0, step_to = 1;         ///< −k (clamp(φ, from, to) − from)
 
   std::uint64_t seed = 0;  ///< of what comes at random times (spikes, sticking)
+
+  bool operator==(const Hidden&) const = default;
 };
+
+/// `hidden` without what move_rig cannot show in a run: the sensors' part, and in a run that is led by hand what acts on
+/// the joint. Two that are equal here move the rig alike.
+Hidden moving_part(const Hidden& hidden, bool free);
 
 }  // namespace blind

@@ -17,13 +17,21 @@ class Muscles {
   Muscles(const Rig& rig, const Hidden& h, double angle) : rig_(rig), h_(h), wheel_(angle), rest_(angle) {
     memory_ = h.hysteresis != 0 || h.asym_up != 0 || h.creep != 0 || h.maxwell != 0 || h.heat_friction != 0 ||
               h.play != 0;
+    warming_ = h.warm_A != 0 || h.warm_B != 0;
+    // Terms that are zero are not worked out: the sums stay the same to the last bit.
+    bare_ = !memory_ && h.torque_offset == 0 && h.asymmetry == 0 && h.cubic_stiffness == 0 &&
+            h.mean_stiffness == 0 && h.quadratic == 0 && h.slack_share == 0 && h.ripple == 0 &&
+            h.mean_damping == 0 && h.cubic_pressure == 0 && h.periodic == 0 && h.odd_pressure_angle == 0 &&
+            h.root_damping == 0 && h.angle_damping == 0 && h.step_stiffness == 0;
+    slippery_ = h.coulomb == 0 && h.stribeck_slide == 0 && h.stribeck_extra == 0 && h.loaded == 0 &&
+                h.angle_friction == 0 && h.heat_friction == 0 && h.sticking == 0;
   }
 
   [[nodiscard]] bool memory() const { return memory_; }
 
   void clock(double day) {
     day_ = day;
-    const double warm = 1.0 - std::exp(-day / h_.warm_time);
+    const double warm = warming_ ? 1.0 - std::exp(-day / h_.warm_time) : 0.0;
     A_ = rig_.A * (1.0 + h_.warm_A * warm) * (day >= h_.wear_time ? 1.0 - h_.wear : 1.0);
     B_ = rig_.B * (1.0 + h_.warm_B * warm);
     gripped_ = false;
@@ -38,6 +46,8 @@ class Muscles {
   void pressures(double p1, double p2) {
     p1_ = p1;
     p2_ = p2;
+    if (h_.loaded != 0)
+      loaded_ = h_.loaded * std::pow(above(0.5 * (p1_ + p2_)) / rig_.p0, h_.loaded_power);
   }
 
   [[nodiscard]] double wheel(double angle) const {
@@ -63,6 +73,7 @@ class Muscles {
     const double r = rig_.r * (1.0 + h_.lever * phi * phi);
     double T = A_ * r * r * phi + B_ * r * delta - (rig_.C + h_.cubic_damping) * w * w * w -
                (rig_.D + h_.linear_damping) * w;
+    if (bare_) return T;
     T += h_.torque_offset + h_.asymmetry * rig_.r * mean;
     T -= h_.cubic_stiffness * phi * phi * phi;
     T += h_.mean_stiffness * rig_.A * rig_.r * rig_.r * phi * (mean / rig_.p0 - 1.0);
@@ -90,12 +101,13 @@ class Muscles {
 
   /// Magnitude of the dry friction when sliding at this speed (N m).
   [[nodiscard]] double dry(double angle, double speed) const {
+    if (slippery_) return 0.0;
     double f = h_.coulomb + h_.stribeck_slide;
     if (h_.stribeck_extra != 0) {
       const double ratio = speed / h_.stribeck_speed;
       f += h_.stribeck_extra * std::exp(-ratio * ratio);
     }
-    if (h_.loaded != 0) f += h_.loaded * std::pow(above(0.5 * (p1_ + p2_)) / rig_.p0, h_.loaded_power);
+    f += loaded_;
     f += h_.angle_friction * std::abs(angle) + h_.heat_friction * heat_;
     return gripped_ ? f + h_.sticking : f;
   }
@@ -132,7 +144,8 @@ class Muscles {
   double p1_ = 0, p2_ = 0, A_ = 0, B_ = 0, day_ = 0;
   double wheel_, rest_, bristle_ = 0, force_ = 0, spring_ = 0, heat_ = 0;
   std::uint64_t window_ = ~std::uint64_t{0};
-  bool memory_ = false, gripped_ = false, gripped_drawn_ = false;
+  double loaded_ = 0;
+  bool memory_ = false, warming_ = false, bare_ = false, slippery_ = false, gripped_ = false, gripped_drawn_ = false;
 };
 
 }  // namespace blind

@@ -26,7 +26,9 @@ double earlier(const std::vector<double>& angle, std::size_t k, double skew) {
          (x + 1) * x * (x - 2) / 2 * y(1) + (x + 1) * x * (x - 1) / 6 * y(2);
 }
 
-void sense(const Hidden& h, const RunPlan& run, Signals& s) {
+}  // namespace
+
+void read_sensors(const Hidden& h, const RunPlan& run, Signals& s) {
   const std::size_t rows = s.angle.size();
   if (h.skew != 0) {
     const std::vector<double> true_angle = s.angle;
@@ -58,9 +60,13 @@ void sense(const Hidden& h, const RunPlan& run, Signals& s) {
   }
 }
 
-}  // namespace
-
 Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, double step) {
+  Signals out = move_rig(rig, run, hidden, step);
+  read_sensors(hidden, run, out);
+  return out;
+}
+
+Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, double step) {
   const int rows = run.rows(), per_row = std::max(1, static_cast<int>(std::lround(kRowTime / step)));
   Signals out;
   for (auto* column : {&out.angle, &out.p1, &out.p2, &out.F1, &out.F2})
@@ -82,6 +88,14 @@ Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
                                     muscles.dry(angle, speed) * sign_of(muscles.wheel_speed(angle, speed));
     f1 = muscles.pull() - T / (2.0 * rig.r);
     f2 = muscles.pull() + T / (2.0 * rig.r);
+  };
+
+  const bool held = valves.direct();
+  const auto advance_valves = [&](std::size_t row, double t, double turned) {
+    if (held)
+      valves.hold(row, h);
+    else
+      valves.step(t, h, turned);
   };
 
   for (int k = 0; k < rows; ++k) {
@@ -111,7 +125,7 @@ Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
       if (run.free) {
         // Pressures at the middle of the step: second order, as the lag is exact.
         const double a1 = valves.p1(day1 - h), a2 = valves.p2(day1 - h);
-        valves.step(t0, h, joint.speed() * h);
+        advance_valves(row, t0, joint.speed() * h);
         const double b1 = valves.p1(day1), b2 = valves.p2(day1);
         muscles.clock(day1 - 0.5 * h);
         muscles.pressures(0.5 * (a1 + b1), 0.5 * (a2 + b2));
@@ -125,7 +139,7 @@ Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
         const double from = run.hand[row], to = run.hand[next];
         const double ahead =
             from * (1 + 2 * x) * y * y + v0 * x * y * y + to * x * x * (3 - 2 * x) - v1 * x * x * y;
-        valves.step(t0, h, ahead - angle);
+        advance_valves(row, t0, ahead - angle);
         angle = ahead;
         speed = ((to - from) * 6 * x * y + v0 * y * (1 - 3 * x) + v1 * x * (3 * x - 2)) * kRate;
         muscles.settle(angle, speed, h);
@@ -143,7 +157,6 @@ Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
       }
     }
   }
-  sense(hidden, run, out);
   return out;
 }
 

@@ -27,6 +27,13 @@ class Valves {
   }
 
   [[nodiscard]] bool direct() const { return direct_; }
+  /// A step within one row, while that row's command holds: what step() gives when nothing but the lag is between
+  /// command and pressure. Only for direct().
+  void hold(std::size_t row, double h) {
+    const double share = fill_.of(h, rig_.T_C);
+    unit_[0].pressure += share * (target(run_.command_1[row]) - unit_[0].pressure);
+    unit_[1].pressure += share * (target(run_.command_2[row]) - unit_[1].pressure);
+  }
 
   /// 1 − e^(−h/T), kept as long as h stays.
   struct Lag {
