@@ -4,43 +4,12 @@
 #include <array>
 #include <cmath>
 
+#include "least_squares.hpp"
+
 namespace blind {
 namespace {
 
 constexpr std::size_t kHalf = 25;  // rows, 50 ms
-
-/// Sums for one normal system of up to eight unknowns, filled row by row.
-struct Normal {
-  std::size_t n;
-  std::vector<double> matrix, right;
-  explicit Normal(std::size_t count) : n(count), matrix(count * count, 0.0), right(count, 0.0) {}
-
-  /// LDLᵀ with the diagonal scaled to one.
-  [[nodiscard]] std::vector<double> solve() const {
-    std::vector<double> scale(n), L(n * n, 0.0), d(n, 0.0), x(n, 0.0);
-    for (std::size_t i = 0; i < n; ++i)
-      scale[i] = matrix[i * n + i] > 0.0 ? 1.0 / std::sqrt(matrix[i * n + i]) : 0.0;
-    for (std::size_t j = 0; j < n; ++j) {
-      double pivot = matrix[j * n + j] * scale[j] * scale[j];
-      for (std::size_t k = 0; k < j; ++k) pivot -= L[j * n + k] * L[j * n + k] * d[k];
-      d[j] = pivot > 1e-12 ? pivot : 0.0;
-      for (std::size_t i = j + 1; i < n && d[j] > 0.0; ++i) {
-        double sum = matrix[i * n + j] * scale[i] * scale[j];
-        for (std::size_t k = 0; k < j; ++k) sum -= L[i * n + k] * L[j * n + k] * d[k];
-        L[i * n + j] = sum / d[j];
-      }
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      x[i] = right[i] * scale[i];
-      for (std::size_t k = 0; k < i; ++k) x[i] -= L[i * n + k] * x[k];
-    }
-    for (std::size_t i = 0; i < n; ++i) x[i] = d[i] > 0.0 ? x[i] / d[i] : 0.0;
-    for (std::size_t i = n; i-- > 0;)
-      for (std::size_t k = i + 1; k < n; ++k) x[i] -= L[k * n + i] * x[k];
-    for (std::size_t i = 0; i < n; ++i) x[i] *= scale[i];
-    return x;
-  }
-};
 
 struct Powers {
   double pp = 0, pg = 0, gg = 0;
@@ -149,20 +118,6 @@ std::vector<double> unit_lag(const std::vector<double>& command, double T_C) {
   return g;
 }
 
-std::vector<double> least_squares(const std::vector<const std::vector<double>*>& columns,
-                                  const std::vector<double>& y) {
-  Normal normal(columns.size());
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    for (std::size_t j = 0; j <= i; ++j) {
-      double sum = 0.0;
-      for (std::size_t k = 0; k < y.size(); ++k) sum += (*columns[i])[k] * (*columns[j])[k];
-      normal.matrix[i * normal.n + j] = normal.matrix[j * normal.n + i] = sum;
-    }
-    for (std::size_t k = 0; k < y.size(); ++k) normal.right[i] += (*columns[i])[k] * y[k];
-  }
-  return normal.solve();
-}
-
 Baseline fit_baseline(const Rig& rig, const std::vector<RunPlan>& runs, const std::vector<Signals>& signals) {
   Normal normal(4);
   for (std::size_t i = 0; i < runs.size(); ++i) {
@@ -186,6 +141,20 @@ Baseline fit_baseline(const Rig& rig, const std::vector<RunPlan>& runs, const st
 }
 
 Residuals residuals(const Rig& rig, const Baseline& base, const RunPlan& run, const Signals& s) {
+  Residuals out = torque_residuals(rig, base, run, s);
+  out.p1 = pressure_residual(base, run.command_1, s.p1);
+  out.p2 = pressure_residual(base, run.command_2, s.p2);
+  return out;
+}
+
+std::vector<double> pressure_residual(const Baseline& base, const std::vector<double>& command,
+                                      const std::vector<double>& p) {
+  std::vector<double> rest = unit_lag(command, base.T_C);
+  for (std::size_t k = 0; k < p.size(); ++k) rest[k] = p[k] - base.K_C * rest[k];
+  return rest;
+}
+
+Residuals torque_residuals(const Rig& rig, const Baseline& base, const RunPlan& run, const Signals& s) {
   Residuals out;
   const std::size_t rows = s.angle.size();
   const std::vector<double> v = velocity_of(s.angle);
@@ -196,12 +165,6 @@ Residuals residuals(const Rig& rig, const Baseline& base, const RunPlan& run, co
     out.torque[k] =
         torque[k] - (base.A * rig.r * rig.r * s.angle[k] + base.B * rig.r * 0.5 * (s.p2[k] - s.p1[k]) -
                      base.C * v[k] * v[k] * v[k] - base.D * v[k]);
-  }
-  out.p1 = unit_lag(run.command_1, base.T_C);
-  out.p2 = unit_lag(run.command_2, base.T_C);
-  for (std::size_t k = 0; k < rows; ++k) {
-    out.p1[k] = s.p1[k] - base.K_C * out.p1[k];
-    out.p2[k] = s.p2[k] - base.K_C * out.p2[k];
   }
   if (run.free && rows > 2 * kHalf) {
     out.balance = triangle_mean(torque);

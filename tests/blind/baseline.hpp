@@ -43,6 +43,10 @@ std::vector<double> triangle_mean(const std::vector<double>& x);
 Baseline fit_baseline(const Rig& rig, const std::vector<RunPlan>& runs, const std::vector<Signals>& signals);
 
 Residuals residuals(const Rig& rig, const Baseline& base, const RunPlan& run, const Signals& signals);
+/// Its two parts: torque and balance alone, and one pressure.
+Residuals torque_residuals(const Rig& rig, const Baseline& base, const RunPlan& run, const Signals& signals);
+std::vector<double> pressure_residual(const Baseline& base, const std::vector<double>& command,
+                                      const std::vector<double>& pressure);
 
 /// Over the runs whose `heldout` is as asked.
 Gap gap_of(const Rig& rig, const Baseline& base, const std::vector<RunPlan>& runs,
@@ -50,10 +54,5 @@ Gap gap_of(const Rig& rig, const Baseline& base, const std::vector<RunPlan>& run
 
 /// Pressure of a valve K_C = 1 with the lag T_C, at rest under the first command.
 std::vector<double> unit_lag(const std::vector<double>& command, double T_C);
-
-/// Solves the normal equations of `columns` against `y` (all of one length) by Cholesky with a little scaling; a column
-/// that the others explain gets zero.
-std::vector<double> least_squares(const std::vector<const std::vector<double>*>& columns,
-                                  const std::vector<double>& y);
 
 }  // namespace blind

@@ -46,8 +46,7 @@ class Muscles {
   void pressures(double p1, double p2) {
     p1_ = p1;
     p2_ = p2;
-    if (h_.loaded != 0)
-      loaded_ = h_.loaded * std::pow(above(0.5 * (p1_ + p2_)) / rig_.p0, h_.loaded_power);
+    if (h_.loaded != 0) loaded_ = h_.loaded * std::pow(above(0.5 * (p1_ + p2_)) / rig_.p0, h_.loaded_power);
   }
 
   [[nodiscard]] double wheel(double angle) const {
@@ -145,7 +144,8 @@ class Muscles {
   double wheel_, rest_, bristle_ = 0, force_ = 0, spring_ = 0, heat_ = 0;
   std::uint64_t window_ = ~std::uint64_t{0};
   double loaded_ = 0;
-  bool memory_ = false, warming_ = false, bare_ = false, slippery_ = false, gripped_ = false, gripped_drawn_ = false;
+  bool memory_ = false, warming_ = false, bare_ = false, slippery_ = false, gripped_ = false,
+       gripped_drawn_ = false;
 };
 
 }  // namespace blind

@@ -4,85 +4,50 @@
 #include <cmath>
 #include <numbers>
 
+#include "colour.hpp"
+#include "known_runs.hpp"
+#include "least_squares.hpp"
 #include "plant.hpp"
 
 namespace blind {
 namespace {
 
 constexpr double kStep = 1e-3;       // s, of the integrator: the rivals' responses need not be finer
-constexpr std::size_t kBlock = 5;    // rows in a mean of 100 Hz
 constexpr std::size_t kStride = 25;  // rows between two triangles of 20 Hz
 constexpr double kNear = 3.0;        // sigma
 
-/// Variances of a channel's samples: a white part and one with memory.
-struct Colour {
-  double white = 0, slow = 0, stay = 0;
-
-  void add(double variance, double memory, double sample_time) {
-    if (variance <= 0.0) return;
-    // Two slow parts become one with the memory of the larger.
-    if (variance > slow) stay = std::exp(-sample_time / memory);
-    slow += variance;
-  }
-
-  /// x becomes the innovations of its Kalman filter, of variance one.
-  void whiten(std::vector<double>& x, std::size_t from) const {
-    double estimate = 0.0, variance = slow;
-    for (std::size_t k = from; k < x.size(); ++k) {
-      const double innovation = x[k] - estimate, spread = variance + white, gain = variance / spread;
-      x[k] = innovation / std::sqrt(spread);
-      estimate = stay * (estimate + gain * innovation);
-      variance = stay * stay * variance * (1.0 - gain) + slow * (1.0 - stay * stay);
-    }
-  }
-};
-
-/// White and slow part of a recorded noise of sd one, in means of kBlock rows.
-Colour colour_of(const std::vector<double>& recorded) {
-  std::vector<double> means;
-  for (std::size_t k = 0; k + kBlock <= recorded.size(); k += kBlock) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < kBlock; ++i) sum += recorded[k + i];
-    means.push_back(sum / static_cast<double>(kBlock));
-  }
-  double c[3] = {};
-  for (std::size_t lag = 0; lag < 3; ++lag) {
-    for (std::size_t k = lag; k < means.size(); ++k) c[lag] += means[k] * means[k - lag];
-    c[lag] /= static_cast<double>(means.size());
-  }
-  Colour colour{c[0], 0.0, 0.0};
-  if (c[1] <= 0.0) return colour;
-  colour.stay = std::clamp(c[2] / c[1], 0.05, 0.98);
-  colour.slow = std::min(c[1] / colour.stay, 0.95 * c[0]);
-  colour.white = c[0] - colour.slow;
-  // The picture is rough; its size is set so that the recording's own innovations have variance one.
-  std::vector<double> innovations = means;
-  colour.whiten(innovations, 0);
-  double square = 0.0;
-  for (const double x : innovations) square += x * x / static_cast<double>(innovations.size());
-  colour.white *= square;
-  colour.slow *= square;
-  return colour;
-}
-
 class Oracle {
  public:
-  explicit Oracle(const Dataset& d) : d_(d) {
-    read_noise();
-    const Baseline truth{d.rig.A, d.rig.B, d.rig.C, d.rig.D, d.rig.K_C, d.rig.T_C};
-    still_ = stacked(truth, simulated(Hidden{}));
+  explicit Oracle(const Dataset& d) : Oracle(d, NoiseOnly{}) {
+    std::vector<Signals> bare(d.runs.size());
+    for (std::size_t i = 0; i < d.runs.size(); ++i) {
+      const RunPlan& run = d.runs[i];
+      if (run.heldout) continue;
+      bare[i] = simulate(d.rig, run, Hidden{}, kWrittenStep);
+      const Signals s = known_.simulated(i, Hidden{});
+      still_.push_back({i, s, pressure(true_base_, run.command_1, s.p1),
+                        pressure(true_base_, run.command_2, s.p2), torque(true_base_, run, s)});
+    }
     // What the integrator and the derivative leave at the truth's own step is no part of the effect.
-    truth_ = stacked(truth, d.clean);
-    const Column plain = stacked(truth, simulated(Hidden{}, kWrittenStep));
+    truth_ = stacked(true_base_, d.clean);
+    const Column plain = stacked(true_base_, bare);
     for (std::size_t k = 0; k < truth_.size(); ++k) truth_[k] -= plain[k];
     sensitivities();
+    fit_ = LeastSquares(base_, truth_);
     for (const Hiding& hiding : d.hidings)
       true_columns_.push_back(response(*hiding.effect, hiding.amplitude, hiding.shape));
   }
 
   /// Only the noise model is wanted of this one.
   struct NoiseOnly {};
-  Oracle(const Dataset& d, NoiseOnly) : d_(d) { read_noise(); }
+  Oracle(const Dataset& d, NoiseOnly)
+      : d_(d),
+        true_base_{d.rig.A, d.rig.B, d.rig.C, d.rig.D, d.rig.K_C, d.rig.T_C},
+        known_(d.rig, d.runs, kStep) {
+    read_noise();
+  }
+  Oracle(const Oracle&) = delete;  // fit_ points into it
+  Oracle& operator=(const Oracle&) = delete;
 
   [[nodiscard]] double whitened_noise(std::vector<Signals> noisy) const {
     for (std::size_t i = 0; i < noisy.size(); ++i)
@@ -95,10 +60,10 @@ class Oracle {
 
   Verdict verdict() {
     Verdict v;
-    v.none = distance({});
+    v.none = fit_.distance({});
     std::vector<const Column*> truth;
     for (const Column& column : true_columns_) truth.push_back(&column);
-    v.self = distance(truth);
+    v.self = fit_.distance(truth);
     Random random(d_.request.seed ^ 0xa0761d6478bd642full);
     for (const Effect& rival : effects()) {
       if (!rival.catalogued || hidden(rival.id)) continue;
@@ -129,20 +94,26 @@ class Oracle {
                        [&](const Hiding& h) { return h.effect->id == id; });
   }
 
-  [[nodiscard]] std::vector<Signals> simulated(const Hidden& hidden, double step = kStep) const {
-    std::vector<Signals> signals(d_.runs.size());
-    for (std::size_t i = 0; i < d_.runs.size(); ++i)
-      if (!d_.runs[i].heldout) signals[i] = simulate(d_.rig, d_.runs[i], hidden, step);
-    return signals;
-  }
-
-  [[nodiscard]] Column response(const Effect& effect, double amplitude, const Shape& shape) const {
+  /// What hiding `effect` adds to the whitened channels. Where it changes no signal, nothing is added.
+  [[nodiscard]] Column response(const Effect& effect, double amplitude, const Shape& shape) {
     Hidden hidden;
     hidden.seed = d_.request.seed;
     effect.apply(hidden, amplitude, shape);
-    const Baseline truth{d_.rig.A, d_.rig.B, d_.rig.C, d_.rig.D, d_.rig.K_C, d_.rig.T_C};
-    Column column = stacked(truth, simulated(hidden));
-    for (std::size_t k = 0; k < column.size(); ++k) column[k] -= still_[k];
+    Column column;
+    column.reserve(truth_.size());
+    const auto add = [&](const Column& with, const Column& without) {
+      for (std::size_t k = 0; k < with.size(); ++k) column.push_back(with[k] - without[k]);
+    };
+    for (const Still& still : still_) {
+      const RunPlan& run = d_.runs[still.run];
+      const Signals s = known_.simulated(still.run, hidden);
+      const bool same_p1 = s.p1 == still.signals.p1, same_p2 = s.p2 == still.signals.p2;
+      add(same_p1 ? still.p1 : pressure(true_base_, run.command_1, s.p1), still.p1);
+      add(same_p2 ? still.p2 : pressure(true_base_, run.command_2, s.p2), still.p2);
+      const bool same = same_p1 && same_p2 && s.angle == still.signals.angle && s.F1 == still.signals.F1 &&
+                        s.F2 == still.signals.F2;
+      add(same ? still.torque : torque(true_base_, run, s), still.torque);
+    }
     return column;
   }
 
@@ -220,39 +191,53 @@ class Oracle {
     for (std::size_t k = kStride; k + kStride < x.size(); k += kStride) out.push_back(x[k]);
   }
 
-  /// One run's residuals, appended whitened. `torque` against the base model, `balance` (free only), both pressures.
-  void append(Column& out, const RunPlan& run, const std::vector<double>& torque,
-              const std::vector<double>& balance, const std::vector<double>& p1,
-              const std::vector<double>& p2) const {
-    constexpr double kMeanTime = kBlock * kRowTime;
-    std::size_t from = out.size();
-    const auto close = [&](const Colour& colour) {
-      colour.whiten(out, from);
-      from = out.size();
-    };
-    for (const auto* p : {&p1, &p2}) {
-      means(out, *p);
-      close(pressure_colour(kMeanTime));
-    }
+  static constexpr double kMeanTime = kBlock * kRowTime;
+
+  /// One run's residual of one pressure, whitened.
+  [[nodiscard]] Column pressure(const std::vector<double>& residual) const {
+    Column out;
+    means(out, residual);
+    pressure_colour(kMeanTime).whiten(out, 0);
+    return out;
+  }
+  [[nodiscard]] Column pressure(const Baseline& base, const std::vector<double>& command,
+                                const std::vector<double>& p) const {
+    return pressure(pressure_residual(base, command, p));
+  }
+
+  /// One run's residual of the torque, whitened; of a free run `balance` and what moves it.
+  [[nodiscard]] Column torque(const RunPlan& run, const std::vector<double>& torque,
+                              const std::vector<double>& balance) const {
+    Column out;
     if (!run.free) {
       means(out, torque);
-      close(torque_colour(kMeanTime));
-      return;
+      torque_colour(kMeanTime).whiten(out, 0);
+      return out;
     }
     std::vector<double> motion = triangle_mean(torque);
     for (std::size_t k = 0; k < motion.size(); ++k) motion[k] -= balance[k];
     strides(out, balance);
-    close(balance_colour(false));
+    balance_colour(false).whiten(out, 0);
+    const std::size_t from = out.size();
     strides(out, motion);
-    close(balance_colour(true));
+    balance_colour(true).whiten(out, from);
+    return out;
   }
+  [[nodiscard]] Column torque(const Baseline& base, const RunPlan& run, const Signals& signals) const {
+    const Residuals r = torque_residuals(d_.rig, base, run, signals);
+    return torque(run, r.torque, r.balance);
+  }
+
+  static void append(Column& out, const Column& part) { out.insert(out.end(), part.begin(), part.end()); }
 
   [[nodiscard]] Column stacked(const Baseline& base, const std::vector<Signals>& signals) const {
     Column out;
     for (std::size_t i = 0; i < d_.runs.size(); ++i) {
-      if (d_.runs[i].heldout) continue;
-      const Residuals r = residuals(d_.rig, base, d_.runs[i], signals[i]);
-      append(out, d_.runs[i], r.torque, r.balance, r.p1, r.p2);
+      const RunPlan& run = d_.runs[i];
+      if (run.heldout) continue;
+      append(out, pressure(base, run.command_1, signals[i].p1));
+      append(out, pressure(base, run.command_2, signals[i].p2));
+      append(out, torque(base, run, signals[i]));
     }
     return out;
   }
@@ -270,7 +255,9 @@ class Oracle {
       for (std::size_t a = 0; a < 4; ++a) {
         for (std::size_t k = 0; k < v.size(); ++k)
           part[k] = a == 0 ? s.angle[k] : a == 1 ? s.p2[k] - s.p1[k] : a == 2 ? v[k] * v[k] * v[k] : v[k];
-        append(base_[a], run, part, triangle_mean(zero), zero, zero);
+        append(base_[a], pressure(zero));
+        append(base_[a], pressure(zero));
+        append(base_[a], torque(run, part, triangle_mean(zero)));
       }
       const auto slope = [&](const std::vector<double>& u) {
         std::vector<double> high = unit_lag(u, T * (1.0 + nudge));
@@ -278,29 +265,15 @@ class Oracle {
         for (std::size_t k = 0; k < high.size(); ++k) high[k] = (high[k] - low[k]) / nudge;
         return high;
       };
-      append(base_[4], run, zero, triangle_mean(zero), unit_lag(run.command_1, T),
-             unit_lag(run.command_2, T));
-      append(base_[5], run, zero, triangle_mean(zero), slope(run.command_1), slope(run.command_2));
+      for (const auto* u : {&run.command_1, &run.command_2}) {
+        append(base_[4], pressure(unit_lag(*u, T)));
+        append(base_[5], pressure(slope(*u)));
+      }
+      for (const std::size_t a : {4u, 5u}) append(base_[a], torque(run, zero, triangle_mean(zero)));
     }
   }
 
   // ---------------------------------------------------------------------------------- distances
-
-  /// Norm of what base parameters and `extra` leave of the truth; `weights` gets those of `extra`.
-  double distance(const std::vector<const Column*>& extra, std::vector<double>* weights = nullptr) const {
-    std::vector<const Column*> columns;
-    for (const Column& column : base_) columns.push_back(&column);
-    columns.insert(columns.end(), extra.begin(), extra.end());
-    const std::vector<double> x = least_squares(columns, truth_);
-    double sum = 0.0;
-    for (std::size_t k = 0; k < truth_.size(); ++k) {
-      double rest = truth_[k];
-      for (std::size_t i = 0; i < columns.size(); ++i) rest -= x[i] * (*columns[i])[k];
-      sum += rest * rest;
-    }
-    if (weights != nullptr) weights->assign(x.begin() + 6, x.end());
-    return std::sqrt(sum);
-  }
 
   /// An asymmetry is more on one side or on the other; between the two it is none, and another effect's name.
   static bool two_sided(const Shape& shape) { return shape.contains("phi_s_ratio"); }
@@ -346,7 +319,7 @@ class Oracle {
 
   /// The rival with this shape, its amplitude sought: the response is linear in it only nearby.
   [[nodiscard]] Try with_shape(const Effect& rival, Shape shape, const std::vector<const Column*>& fixed,
-                               double alone) const {
+                               double alone) {
     Try best{alone, {}, shape};
     double amplitude = rival.typical;
     for (int round = 0; round < 3; ++round) {
@@ -354,7 +327,7 @@ class Oracle {
       std::vector<const Column*> extra = fixed;
       extra.push_back(&column);
       std::vector<double> weights;
-      const double sigma = distance(extra, &weights), weight = weights.back();
+      const double sigma = fit_.distance(extra, &weights), weight = weights.back();
       const bool allowed = weight > 0.0 || shape.contains("sign");
       if (allowed && sigma < best.sigma) best = {sigma, std::move(column), shape};
       if (!allowed || sigma > std::max(2.0 * kNear, 0.5 * alone) || std::abs(weight - 1.0) < 0.1) break;
@@ -366,10 +339,10 @@ class Oracle {
     return best;
   }
 
-  double nearest_of(const Effect& rival, const std::vector<Column>& kept, Random& random) const {
+  double nearest_of(const Effect& rival, const std::vector<Column>& kept, Random& random) {
     std::vector<const Column*> fixed;
     for (const Column& column : kept) fixed.push_back(&column);
-    const double alone = distance(fixed);
+    const double alone = fit_.distance(fixed);
     std::vector<Try> tries;
     const auto take = [&](const Shape& shape) {
       if (Try one = with_shape(rival, shape, fixed, alone); !one.column.empty())
@@ -391,15 +364,26 @@ class Oracle {
     fixed.push_back(&tries[0].column);
     fixed.push_back(&tries[1].column);
     std::vector<double> weights;
-    const double together = distance(fixed, &weights);
+    const double together = fit_.distance(fixed, &weights);
     const std::size_t last = weights.size() - 1;
     if (weights[last] * weights[last - 1] < 0.0) return tries[0].sigma;
     return std::min(tries[0].sigma, together);
   }
 
+  /// A fitted run of the rig in which nothing is hidden, and its whitened channels.
+  struct Still {
+    std::size_t run;
+    Signals signals;
+    Column p1, p2, torque;
+  };
+
   const Dataset& d_;
+  Baseline true_base_;
+  KnownRuns known_;
   Colour force_, pressure_;
-  Column still_, truth_;
+  std::vector<Still> still_;
+  Column truth_;
+  LeastSquares fit_;
   std::vector<Column> base_, true_columns_;
 };
 
