@@ -84,8 +84,14 @@ std::vector<double> velocity_of(const std::vector<double>& angle) {
     return angle[static_cast<std::size_t>(std::min(std::abs(k), last))];
   };
   std::vector<double> v(angle.size());
-  for (std::ptrdiff_t k = 0; k <= last; ++k)
-    v[static_cast<std::size_t>(k)] = (8.0 * (at(k + 1) - at(k - 1)) - at(k + 2) + at(k - 2)) / 12.0 * kRate;
+  for (std::ptrdiff_t k = 0; k <= last; ++k) {
+    if (k >= 2 && k + 2 <= last) {
+      const double* x = angle.data() + k;
+      v[static_cast<std::size_t>(k)] = (8.0 * (x[1] - x[-1]) - x[2] + x[-2]) / 12.0 * kRate;
+    } else {
+      v[static_cast<std::size_t>(k)] = (8.0 * (at(k + 1) - at(k - 1)) - at(k + 2) + at(k - 2)) / 12.0 * kRate;
+    }
+  }
   return v;
 }
 

@@ -86,5 +86,7 @@ struct Hidden {
 /// `hidden` without what move_rig cannot show in a run: the sensors' part, and in a run that is led by hand what acts on
 /// the joint. Two that are equal here move the rig alike.
 Hidden moving_part(const Hidden& hidden, bool free);
+/// Nothing of `hidden` is in the sensors (but for the lag of the forces, which move_rig has).
+bool sensors_are_true(const Hidden& hidden);
 
 }  // namespace blind

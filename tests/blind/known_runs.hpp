@@ -16,14 +16,17 @@ class KnownRuns {
   KnownRuns(const Rig& rig, const std::vector<RunPlan>& runs, double step)
       : rig_(rig), runs_(runs), step_(step), bare_(runs.size()) {}
 
-  /// To the last bit simulate(rig, runs[i], hidden, step).
-  Signals simulated(std::size_t i, const Hidden& hidden);
+  /// To the last bit simulate(rig, runs[i], hidden, step); stands until the next call.
+  const Signals& simulated(std::size_t i, const Hidden& hidden);
+  /// With nothing hidden; stands. What simulated() returns where `hidden` changes nothing.
+  const Signals& bare(std::size_t i);
 
  private:
   const Rig& rig_;
   const std::vector<RunPlan>& runs_;
   double step_;
   std::vector<Signals> bare_;  ///< of the rig in which nothing is hidden; empty until it is asked for
+  Signals changed_;
 };
 
 }  // namespace blind

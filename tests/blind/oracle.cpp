@@ -24,8 +24,8 @@ class Oracle {
       const RunPlan& run = d.runs[i];
       if (run.heldout) continue;
       bare[i] = simulate(d.rig, run, Hidden{}, kWrittenStep);
-      const Signals s = known_.simulated(i, Hidden{});
-      still_.push_back({i, s, pressure(true_base_, run.command_1, s.p1),
+      const Signals& s = known_.bare(i);
+      still_.push_back({i, pressure(true_base_, run.command_1, s.p1),
                         pressure(true_base_, run.command_2, s.p2), torque(true_base_, run, s)});
     }
     // What the integrator and the derivative leave at the truth's own step is no part of the effect.
@@ -106,12 +106,15 @@ class Oracle {
     };
     for (const Still& still : still_) {
       const RunPlan& run = d_.runs[still.run];
-      const Signals s = known_.simulated(still.run, hidden);
-      const bool same_p1 = s.p1 == still.signals.p1, same_p2 = s.p2 == still.signals.p2;
+      const Signals &s = known_.simulated(still.run, hidden), &bare = known_.bare(still.run);
+      if (&s == &bare) {
+        column.resize(column.size() + still.p1.size() + still.p2.size() + still.torque.size(), 0.0);
+        continue;
+      }
+      const bool same_p1 = s.p1 == bare.p1, same_p2 = s.p2 == bare.p2;
       add(same_p1 ? still.p1 : pressure(true_base_, run.command_1, s.p1), still.p1);
       add(same_p2 ? still.p2 : pressure(true_base_, run.command_2, s.p2), still.p2);
-      const bool same = same_p1 && same_p2 && s.angle == still.signals.angle && s.F1 == still.signals.F1 &&
-                        s.F2 == still.signals.F2;
+      const bool same = same_p1 && same_p2 && s.angle == bare.angle && s.F1 == bare.F1 && s.F2 == bare.F2;
       add(same ? still.torque : torque(true_base_, run, s), still.torque);
     }
     return column;
@@ -373,7 +376,6 @@ class Oracle {
   /// A fitted run of the rig in which nothing is hidden, and its whitened channels.
   struct Still {
     std::size_t run;
-    Signals signals;
     Column p1, p2, torque;
   };
 

@@ -29,6 +29,7 @@ double earlier(const std::vector<double>& angle, std::size_t k, double skew) {
 }  // namespace
 
 void read_sensors(const Hidden& h, const RunPlan& run, Signals& s) {
+  if (sensors_are_true(h)) return;
   const std::size_t rows = s.angle.size();
   if (h.skew != 0) {
     const std::vector<double> true_angle = s.angle;
@@ -78,8 +79,10 @@ Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
   Joint joint(rig, hidden, muscles, start);
   const bool lagged = hidden.force_lag != 0;
   // By hand, without memory and with plain valves, a row is one exact step.
-  const int parts = run.free || !valves.direct() || muscles.memory() || lagged ? per_row : 1;
+  const bool exact = !run.free && valves.direct() && !muscles.memory() && !lagged;
+  const int parts = exact ? 1 : per_row;
   const double h = kRowTime / parts;
+  Lag force_lag;
   double angle = start, speed = 0.0, F1 = 0.0, F2 = 0.0;
 
   const auto forces = [&](double& f1, double& f2) {
@@ -95,7 +98,7 @@ Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
     if (held)
       valves.hold(row, h);
     else
-      valves.step(t, h, turned);
+      valves.step(row, t, h, turned);
   };
 
   for (int k = 0; k < rows; ++k) {
@@ -120,6 +123,10 @@ Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
     out.F2[row] = F2;
 
     const std::size_t next = std::min(row + 1, static_cast<std::size_t>(rows) - 1);
+    if (exact) {
+      valves.hold(row, h);
+      continue;
+    }
     for (int i = 0; i < parts; ++i) {
       const double t0 = t + i * h, day1 = run.started + t0 + h;
       if (run.free) {
@@ -151,7 +158,7 @@ Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
       if (lagged) {
         const double before_1 = now_1, before_2 = now_2;
         forces(now_1, now_2);
-        const double gain = 1.0 - std::exp(-h / hidden.force_lag);
+        const double gain = force_lag.of(h, hidden.force_lag);
         F1 += gain * (0.5 * (before_1 + now_1) - F1);
         F2 += gain * (0.5 * (before_2 + now_2) - F2);
       }

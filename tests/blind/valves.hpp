@@ -23,7 +23,7 @@ class Valves {
       unit_[i].pressure = target(unit_[i].command);
     }
     if (!direct_)  // at rest under the first command, whatever is hidden
-      for (int k = 0; k < 4000; ++k) step(0.0, 1e-3, 0.0);
+      for (int k = 0; k < 4000; ++k) step(0, 0.0, 1e-3, 0.0);
   }
 
   [[nodiscard]] bool direct() const { return direct_; }
@@ -35,26 +35,13 @@ class Valves {
     unit_[1].pressure += share * (target(run_.command_2[row]) - unit_[1].pressure);
   }
 
-  /// 1 − e^(−h/T), kept as long as h stays.
-  struct Lag {
-    double time = 0.0, step = 0.0, share = 0.0;
-    double of(double h, double T) {
-      if (h != step || T != time) {
-        step = h;
-        time = T;
-        share = 1.0 - std::exp(-h / T);
-      }
-      return share;
-    }
-  };
-
-  /// From t to t + h; `turned` is how far the joint turned in it.
-  void step(double t, double h, double turned) {
+  /// From t to t + h, which lies within `row`; `turned` is how far the joint turned in it.
+  void step(std::size_t row, double t, double h, double turned) {
     const double sag = h_.droop * flow_;
     double filling = 0.0;
     for (int i = 0; i < 2; ++i) {
       Unit& u = unit_[i];
-      double demand = command(i, t - h_.dead_time, h);
+      double demand = h_.dead_time != 0 ? command(i, t - h_.dead_time, h) : commands(i)[row];
       if (h_.valve_play != 0) demand = u.command = follow_play(u.command, demand, h_.valve_play);
       if (h_.second_lag != 0) demand = advance(u.lagged, second_.of(h, h_.second_lag), demand);
       const double error = target(demand) * (1.0 - sag) - u.pressure;
@@ -67,7 +54,7 @@ class Valves {
       change += (i == 0 ? -h_.pump : h_.pump) * turned;
       u.pressure += change;
     }
-    if (h_.droop != 0) flow_ += (1.0 - std::exp(-h / h_.droop_time)) * (filling / h - flow_);
+    if (h_.droop != 0) flow_ += sag_.of(h, h_.droop_time) * (filling / h - flow_);
   }
 
   [[nodiscard]] double p1(double day) const {
@@ -91,23 +78,26 @@ class Valves {
     if (h_.hunting == 0) return 0.0;
     return h_.hunting * std::sin(kTwoPi * h_.hunting_frequency * day + h_.hunting_phase + phase);
   }
+  [[nodiscard]] const std::vector<double>& commands(int i) const {
+    return i == 0 ? run_.command_1 : run_.command_2;
+  }
   /// The mean command from t to t + h; it changes at rows only.
   [[nodiscard]] double command(int i, double t, double h) const {
-    const auto& u = i == 0 ? run_.command_1 : run_.command_2;
+    const std::vector<double>& u = commands(i);
     const auto held = [&](double row) {
       return u[static_cast<std::size_t>(std::clamp(row, 0.0, run_.rows() - 1.0))];
     };
     constexpr double kTiny = 1e-6;  // of a row: time is a sum of steps
-    const double from = t * kRate, to = (t + h) * kRate, row = std::floor(to - kTiny);
+    const double from = t * kRate, to = (t + h) * kRate, row = floor_of(to - kTiny);
     if (from + kTiny >= row) return held(row);
-    return ((row - from) * held(std::floor(from + kTiny)) + (to - row) * held(row)) / (to - from);
+    return ((row - from) * held(floor_of(from + kTiny)) + (to - row) * held(row)) / (to - from);
   }
 
   const Rig& rig_;
   const Hidden& h_;
   const RunPlan& run_;
   Unit unit_[2];
-  Lag fill_, vent_, second_;
+  Lag fill_, vent_, second_, sag_;
   double flow_ = 0.0;
   bool direct_ = true;
 };
