@@ -87,31 +87,47 @@ class Joint {
     return T;
   }
 
-  [[nodiscard]] State slope(const State& s, double direction) const {
-    double T = muscles_.smooth(s.phi, s.w) + others(s.phi, s.w, s.far_phi, s.far_w);
-    T -= direction * (muscles_.dry(s.phi, s.w) + h_.bearing);
-    State d{s.w, T / inertia_, 0.0, 0.0};
-    if (h_.compliance != 0) {
-      d.far_phi = s.far_w;
-      d.far_w = (stiffness_ * (s.phi - s.far_phi) + damping_ * (s.w - s.far_w)) / far_inertia_;
-    }
-    return d;
-  }
-
-  static State moved(const State& s, const State& d, double h) {
-    return {s.phi + h * d.phi, s.w + h * d.w, s.far_phi + h * d.far_phi, s.far_w + h * d.far_w};
+  /// φ̈ of the wheel, with dry friction against `direction`.
+  [[nodiscard]] double acceleration(const State& s, double direction) const {
+    const double T = muscles_.smooth(s.phi, s.w) + others(s.phi, s.w, s.far_phi, s.far_w);
+    return (T - direction * (muscles_.dry(s.phi, s.w) + h_.bearing)) / inertia_;
   }
 
   [[nodiscard]] State runge_kutta(const State& s, double h, double direction) const {
-    const State a = slope(s, direction), b = slope(moved(s, a, 0.5 * h), direction);
-    const State c = slope(moved(s, b, 0.5 * h), direction), d = slope(moved(s, c, h), direction);
+    return h_.compliance != 0 ? runge_kutta_of<true>(s, h, direction)
+                              : runge_kutta_of<false>(s, h, direction);
+  }
+
+  /// The far side of a spring is carried along only where there is one: most of the time goes into this.
+  template <bool kSpring>
+  [[nodiscard]] State runge_kutta_of(const State& s, double h, double direction) const {
+    const auto slope = [&](const State& at) {
+      State d{at.w, acceleration(at, direction), 0.0, 0.0};
+      if constexpr (kSpring) {
+        d.far_phi = at.far_w;
+        d.far_w = (stiffness_ * (at.phi - at.far_phi) + damping_ * (at.w - at.far_w)) / far_inertia_;
+      }
+      return d;
+    };
+    const auto moved = [&](const State& d, double step) {
+      State to{s.phi + step * d.phi, s.w + step * d.w, s.far_phi, s.far_w};
+      if constexpr (kSpring) {
+        to.far_phi += step * d.far_phi;
+        to.far_w += step * d.far_w;
+      }
+      return to;
+    };
+    const State a = slope(s), b = slope(moved(a, 0.5 * h)), c = slope(moved(b, 0.5 * h)),
+                d = slope(moved(c, h));
     const auto mean = [](double k1, double k2, double k3, double k4) {
       return (k1 + 2.0 * (k2 + k3) + k4) / 6.0;
     };
-    return moved(s,
-                 {mean(a.phi, b.phi, c.phi, d.phi), mean(a.w, b.w, c.w, d.w),
-                  mean(a.far_phi, b.far_phi, c.far_phi, d.far_phi), mean(a.far_w, b.far_w, c.far_w, d.far_w)},
-                 h);
+    State all{mean(a.phi, b.phi, c.phi, d.phi), mean(a.w, b.w, c.w, d.w), 0.0, 0.0};
+    if constexpr (kSpring) {
+      all.far_phi = mean(a.far_phi, b.far_phi, c.far_phi, d.far_phi);
+      all.far_w = mean(a.far_w, b.far_w, c.far_w, d.far_w);
+    }
+    return moved(all, h);
   }
 
   /// The wheel sticks; what hangs on the spring swings on (semi-implicit, it is exact enough for a moment of sticking).
