@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -108,6 +109,30 @@ TEST(Dataset, is_the_same_for_the_same_seed_and_another_for_another) {
   }
   EXPECT_TRUE(texts[0] == texts[1]);
   EXPECT_FALSE(texts[0] == texts[2]);
+}
+
+TEST(Dataset, writes_every_number_rounded_as_the_standard_library_rounds_it) {
+  const Folder folder("digits");
+  const Dataset d = make_dataset({.seed = 9});
+  const std::vector<Signals> noisy = write_dataset(d, folder.path());
+  const auto text = [](double x, int digits) {
+    char buffer[40];
+    return std::string(
+        buffer, std::to_chars(buffer, buffer + sizeof buffer, x, std::chars_format::fixed, digits).ptr);
+  };
+  const RunPlan& run = d.runs.front();
+  std::ifstream in((run.heldout ? folder.path() / "heldout" : folder.path()) / (run.name + ".csv"));
+  std::string line;
+  for (int i = 0; i < 3; ++i) std::getline(in, line);
+  std::size_t rows = 0;
+  for (; std::getline(in, line); ++rows) {
+    const Signals& s = noisy.front();
+    const std::string cells = text(s.angle[rows], 8) + "," + text(s.p1[rows], 6) + "," + text(s.p2[rows], 6) +
+                              "," + text(run.command_1[rows], 5) + "," + text(run.command_2[rows], 5) + "," +
+                              text(s.F1[rows], 4) + "," + text(s.F2[rows], 4);
+    ASSERT_EQ(line.substr(line.find(',') + 1), cells) << "row " << rows;
+  }
+  EXPECT_EQ(rows, noisy.front().angle.size());
 }
 
 TEST(Dataset, writes_recordings_that_say_what_was_done_and_when_and_nothing_of_what_is_hidden) {

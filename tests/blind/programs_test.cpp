@@ -87,6 +87,36 @@ TEST_F(Programs, hand_on_what_is_hidden_and_make_tables_of_the_answers) {
   EXPECT_NE(text("said").find("| leak | 1 | 0 | (none) (1) |"), std::string::npos) << text("said");
 }
 
+TEST_F(Programs, take_the_name_of_what_is_hidden_away_from_the_very_datasets_of_clear) {
+  const std::string results = path("results");
+  ASSERT_EQ(run("blind_run --results " + results + " --explain " + contented() +
+                " --tier clear,leave-one-out --effect force_offset --noise white"),
+            0)
+      << text("complaint");
+  const std::vector<std::string> calls = lines("calls"), all = lines("results");
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(calls[0].find("--exclude"), std::string::npos);
+  EXPECT_TRUE(calls[1].ends_with("--json - --exclude force_offset")) << calls[1];
+  const auto label = [](const std::string& line) {
+    return line.substr(line.find("\"label\""), line.find("\"oracle\"") - line.find("\"label\""));
+  };
+  EXPECT_EQ(label(all[0]), label(all[1]));
+  ASSERT_EQ(run("blind_score " + results), 0) << text("complaint");
+  EXPECT_NE(text("said").find("name taken out"), std::string::npos) << text("said");
+}
+
+TEST_F(Programs, ask_the_oracle_only_where_a_name_can_be_right) {
+  ASSERT_EQ(run("blind_run --oracle --results " + path("results") + " --explain " + contented() +
+                " --tier none,outside --effect root_damping --noise white"),
+            0)
+      << text("complaint");
+  const std::vector<std::string> all = lines("results");
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_TRUE(all[1].starts_with(
+      "{\"key\":\"unknown/white/root_damping/"));  // the tier's name of old: its seeds stay
+  for (const std::string& line : all) EXPECT_NE(line.find("\"oracle\":null"), std::string::npos);
+}
+
 TEST_F(Programs, end_an_answer_that_takes_too_long) {
   ASSERT_EQ(run("blind_run --results " + path("results") + " --explain " + script("slow", "exec sleep 60") +
                 " --tier none --noise white --timeout 0.3"),

@@ -31,27 +31,22 @@ std::string strength(const Truth& t) {
   return t.ratio >= 1.5 ? "strong" : t.ratio >= 0.5 ? "clear" : "faint";
 }
 
-/// The largest distance between the p-values' distribution and the uniform one.
-double uniform_distance(std::vector<double> p) {
-  std::sort(p.begin(), p.end());
-  double largest = 0.0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    const auto n = static_cast<double>(p.size()), k = static_cast<double>(i);
-    largest = std::max({largest, std::abs(p[i] - k / n), std::abs((k + 1.0) / n - p[i])});
-  }
-  return largest;
+std::string percent(double share) {
+  return fixed(100.0 * share, 1) + " %";
 }
 
 std::string false_alarms(const Group& none) {
   std::string text =
-      "## Nothing hidden\n\n| noise | nothing named | no disagreement | p-values: largest distance from "
-      "uniform |\n|---|---|---|---|\n";
+      "## Nothing hidden\n\n| noise | nothing named | no disagreement | p-values: too many small ones by | "
+      "too "
+      "few by | limit of either at 95 % |\n|---|---|---|---|---|---|\n";
   for (const char* noise : {"white", "coloured", "quantised", "real"}) {
     const Group group = only(none, [&](const Scored& s) { return s.one->truth.noise == noise; });
     if (group.empty()) continue;
     std::vector<double> p;
     for (const Scored& s : group)
-      p.insert(p.end(), s.one->answer.p_values.begin(), s.one->answer.p_values.end());
+      if (s.one->answer.failed.empty() && s.one->answer.p_value >= 0.0) p.push_back(s.one->answer.p_value);
+    const PDistance far = p_distance(p);
     text +=
         std::string("| ") + noise + " | " +
         share_of(group,
@@ -63,9 +58,8 @@ std::string false_alarms(const Group& none) {
         share_of(group,
                  [](const Scored& s) { return s.one->answer.failed.empty() && !s.one->answer.detected; }) +
         " | " +
-        (p.empty() ? "–"
-                   : fixed(uniform_distance(p), 3) + " (limit at 95 %: " +
-                         fixed(1.36 / std::sqrt(static_cast<double>(p.size())), 3) + ")") +
+        (p.empty() ? "– | – | –"
+                   : percent(far.small) + " | " + percent(far.large) + " | " + percent(far.limit)) +
         " |\n";
   }
   return text + "\n";
@@ -100,22 +94,72 @@ std::string singles(const Group& single) {
          share_of(ties, [](const Scored& s) { return s.j.in_set; }) + "\n\n";
 }
 
-std::string others(const Group& pair, const Group& unknown) {
-  std::string text;
-  if (!pair.empty())
-    text += "## Two effects hidden\n\n- both named: " +
-            share_of(pair, [](const Scored& s) { return s.j.all_named; }) +
-            "\n- both in the set: " + share_of(pair, [](const Scored& s) { return s.j.in_set; }) + "\n\n";
-  if (!unknown.empty())
-    text +=
-        "## An effect outside the catalogue\n\n- detected: " +
-        share_of(unknown, [](const Scored& s) { return s.one->answer.detected; }) +
-        "\n- left unnamed: " + share_of(unknown, [](const Scored& s) { return s.j.left_unnamed; }) +
-        "\n- left unnamed, with the right variables: " +
-        share_of(unknown, [](const Scored& s) { return s.j.right_variables; }) +
-        "\n- one name, not flagged: " + share_of(unknown, [](const Scored& s) { return s.j.single_wrong; }) +
-        "\n\n";
-  return text;
+/// A table of shares, one row for every kind of noise that occurs and one for all.
+struct Share {
+  const char* title;
+  bool (*yes)(const Scored& s);
+};
+std::string by_noise(const char* headline, const Group& group, const std::vector<Share>& shares) {
+  if (group.empty()) return "";
+  std::string text = std::string("## ") + headline + "\n\n| noise |", rule = "|---|";
+  for (const Share& one : shares) {
+    text += std::string(" ") + one.title + " |";
+    rule += "---|";
+  }
+  text += "\n" + rule + "\n";
+  for (const char* noise : {"", "white", "coloured", "quantised", "real"}) {
+    const std::string kind = noise;
+    const Group part =
+        only(group, [&](const Scored& s) { return kind.empty() || s.one->truth.noise == kind; });
+    if (part.empty()) continue;
+    text += "| " + (kind.empty() ? "all" : kind) + " |";
+    for (const Share& one : shares) text += " " + share_of(part, one.yes) + " |";
+    text += "\n";
+  }
+  return text + "\n";
+}
+
+std::string pairs(const Group& pair) {
+  return by_noise("Two effects hidden", pair,
+                  {{"both named", [](const Scored& s) { return s.j.all_named; }},
+                   {"just one named", [](const Scored& s) { return s.j.one_named; }},
+                   {"both in the set", [](const Scored& s) { return s.j.in_set; }},
+                   {"one name, wrong, not flagged", [](const Scored& s) { return s.j.single_wrong; }}});
+}
+
+std::string outside(const Group& unknown) {
+  return by_noise("An effect outside the catalogue", unknown,
+                  {{"detected", [](const Scored& s) { return s.one->answer.detected; }},
+                   {"unknown, with the right variables", [](const Scored& s) { return s.j.right_variables; }},
+                   {"unknown", [](const Scored& s) { return s.j.left_unnamed; }},
+                   {"one name, not flagged", [](const Scored& s) { return s.j.single_wrong; }}});
+}
+
+bool flagged(const Scored& s) {
+  const Answer& a = s.one->answer;
+  return a.failed.empty() && !a.effects.empty() && !s.j.asserted;
+}
+
+/// Every dataset is in one of the columns, and the last line says whose names were taken.
+std::string left_out(const Group& group) {
+  std::string text = by_noise("The effect's own name taken out of the catalogue", group,
+                              {{"unknown", [](const Scored& s) { return s.j.left_unnamed; }},
+                               {"a set that says it is not sure", flagged},
+                               {"another's name, not flagged", [](const Scored& s) { return s.j.asserted; }},
+                               {"nothing found, or no answer", [](const Scored& s) {
+                                  return !s.j.left_unnamed && !s.j.asserted && !flagged(s);
+                                }}});
+  std::map<std::string, int> taken;
+  for (const Scored& s : group)
+    if (s.j.asserted) ++taken[s.one->truth.ids.front() + " as " + s.one->answer.effects.front()];
+  if (taken.empty()) return text;
+  text += "Another's name, not flagged:";
+  const char* before = " ";
+  for (const auto& [names, count] : taken) {
+    text += before + names + " (" + std::to_string(count) + ")";
+    before = ", ";
+  }
+  return text + "\n\n";
 }
 
 std::string gaps(const Group& named) {
@@ -140,6 +184,7 @@ std::string reliability(const Group& all) {
   } bins[10];
   double count = 0.0;
   for (const Scored& s : all) {
+    if (s.one->truth.kind == "left_out") continue;  // no name could be right
     for (std::size_t i = 0; i < s.one->answer.effects.size(); ++i) {
       const double c = s.one->answer.confidences[i];
       Bin& bin = bins[std::clamp(static_cast<int>(c * 10.0), 0, 9)];
@@ -166,7 +211,7 @@ std::string reliability(const Group& all) {
 std::string confusion(const Group& all) {
   std::map<std::string, std::map<std::string, int>> table;
   for (const Scored& s : all) {
-    if (s.one->truth.kind == "pair") continue;
+    if (s.one->truth.kind == "pair" || s.one->truth.kind == "left_out") continue;
     const Answer& a = s.one->answer;
     const std::string said = !a.failed.empty()   ? "(no answer)"
                              : a.effects.empty() ? "(" + a.verdict + ")"
@@ -218,8 +263,9 @@ std::string report(const std::vector<Case>& cases) {
   for (const auto& [reason, count] : silent)
     text += "- without an answer: " + std::to_string(count) + " (" + reason + ")\n";
   if (!silent.empty()) text += "\n";
-  text += false_alarms(of_kind("none")) + singles(of_kind("single")) +
-          others(of_kind("pair"), of_kind("unknown"));
+  if (const Group none = of_kind("none"); !none.empty()) text += false_alarms(none);
+  if (const Group single = of_kind("single"); !single.empty()) text += singles(single);
+  text += pairs(of_kind("pair")) + outside(of_kind("unknown")) + left_out(of_kind("left_out"));
   text += gaps(only(
       asked, [](const Scored& s) { return s.one->truth.kind == "single" || s.one->truth.kind == "pair"; }));
   text += methods_table(cases) + reliability(asked) + confusion(asked);

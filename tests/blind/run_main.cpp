@@ -30,15 +30,19 @@ constexpr const char* kUsage =
     "blind_run --results FILE --explain PROGRAM [--tier NAMES] [--noise KINDS] [--effect IDS] [--count N] "
     "[--seed N]\n"
     "          [--jobs N] [--timeout S] [--oracle] [--baselines PROGRAM] [-- WORDS FOR PROGRAM]\n"
-    "  NAMES of none, strong, clear, faint, pair, unknown (comma between; default all); KINDS as in "
-    "blind_generate\n"
-    "  --count: datasets per kind of noise, for single and unknown effects also per effect (default 1)\n"
+    "  NAMES of none, strong, clear, faint, pair, outside (also called unknown), leave-one-out (comma "
+    "between;\n"
+    "  default all but the last); KINDS as in blind_generate\n"
+    "  leave-one-out: the datasets of clear again, judged with '--exclude ID' of what is hidden\n"
+    "  --count: datasets per kind of noise, where one effect is hidden also per effect (default 1)\n"
+    "  --oracle: where names can be right (strong, clear, faint, pair) the label says what nobody can tell "
+    "apart\n"
     "  --baselines: blind_baselines, asked about the same datasets; without --explain it is asked alone\n"
     "  among WORDS, {ids} stands for what is hidden, for a test that takes the truth out of the catalogue\n";
 
 struct Plan {
   std::filesystem::path results, program, baselines, recordings;
-  std::vector<std::string> tiers = {"none", "strong", "clear", "faint", "pair", "unknown"};
+  std::vector<std::string> tiers = {"none", "strong", "clear", "faint", "pair", "outside"};
   std::vector<std::string> noises = {"white", "coloured", "quantised", "real"};
   std::vector<std::string> only, words;
   int count = 1, jobs = 1;
@@ -50,6 +54,7 @@ struct Plan {
 struct Task {
   std::string key;
   blind::Request request;
+  bool left_out = false;  ///< what is hidden is taken out of the program's catalogue
 };
 
 std::vector<std::string> split(const std::string& text) {
@@ -112,6 +117,8 @@ std::uint64_t seed_of(const std::string& key) {
   return hash >> 1;
 }
 
+constexpr const char* kLeftOut = "leave-one-out";
+
 class Tasks {
  public:
   explicit Tasks(const Plan& plan) : plan_(plan) {
@@ -144,27 +151,29 @@ class Tasks {
           {known[static_cast<std::size_t>(a)], known[static_cast<std::size_t>(b < a ? b : b + 1)]}, 0.75, i);
     } else {
       const double ratio = tier == "strong" ? 2.0 : tier == "faint" ? 0.25 : 0.75;
-      if (tier != "strong" && tier != "faint" && tier != "clear" && tier != "unknown")
+      const bool outside = tier == "outside" || tier == "unknown";
+      if (tier != "strong" && tier != "faint" && tier != "clear" && tier != kLeftOut && !outside)
         throw std::invalid_argument("no tier is called '" + tier + "'");
       for (const blind::Effect& one : blind::effects()) {
-        if (one.catalogued == (tier == "unknown")) continue;
+        if (one.catalogued == outside) continue;
         if (plan_.only.empty() || std::find(plan_.only.begin(), plan_.only.end(), one.id) != plan_.only.end())
-          add(tier, noise, {one.id}, ratio, i);
+          add(outside ? "unknown" : tier, noise, {one.id}, ratio, i);
       }
     }
   }
   void add(const std::string& tier, const std::string& noise, std::vector<std::string> ids, double ratio,
            int i) {
-    std::string key = tier + "/" + noise + "/";
-    for (std::size_t k = 0; k < ids.size(); ++k) key += (k > 0 ? "+" : "") + ids[k];
-    key += "/" + std::to_string(plan_.seed) + "." + std::to_string(i);
+    std::string rest = "/" + noise + "/";
+    for (std::size_t k = 0; k < ids.size(); ++k) rest += (k > 0 ? "+" : "") + ids[k];
+    rest += "/" + std::to_string(plan_.seed) + "." + std::to_string(i);
     blind::Request request;
-    request.seed = seed_of(key);
+    const bool left_out = tier == kLeftOut;
+    request.seed = seed_of((left_out ? "clear" : tier) + rest);  // the very dataset, now without its name
     request.ids = std::move(ids);
     request.ratio = ratio;
     request.noise = noise;
     request.recordings = plan_.recordings;
-    list.push_back({key, std::move(request)});
+    list.push_back({tier + rest, std::move(request), left_out});
   }
 
   const Plan& plan_;
@@ -235,7 +244,10 @@ Outcome run_program(std::vector<std::string> words, const std::filesystem::path&
 class Scratch {
  public:
   Scratch() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "isac-blind-XXXXXX").string();
+    // A dataset is 20 MB that live for seconds: in memory, where the system has a place for that and nobody asked for another.
+    const bool memory = std::getenv("TMPDIR") == nullptr && access("/dev/shm", W_OK | X_OK) == 0;
+    const std::filesystem::path place = memory ? "/dev/shm" : std::filesystem::temp_directory_path();
+    std::string pattern = (place / "isac-blind-XXXXXX").string();
     if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("cannot make a temporary folder");
     path = pattern;
   }
@@ -257,7 +269,9 @@ std::string line_of(const Plan& plan, const Task& task) {
   std::optional<Outcome> outcome, baselines;
   if (testable) {
     noise = blind::heldout_noise(dataset, blind::write_dataset(dataset, scratch.path / "dataset"));
-    if (plan.oracle && !dataset.hidings.empty()) verdict = blind::judge(dataset);
+    // Only a name can be tied with another: where none is right, nobody asks the oracle.
+    const bool names = !dataset.hidings.empty() && dataset.hidings.front().effect->catalogued;
+    if (plan.oracle && names && !task.left_out) verdict = blind::judge(dataset);
     std::vector<std::string> words = {plan.program.string(), (scratch.path / "dataset").string(), "--json",
                                       "-"};
     std::string ids;
@@ -266,8 +280,10 @@ std::string line_of(const Plan& plan, const Task& task) {
       if (const std::size_t at = word.find("{ids}"); at != std::string::npos) word.replace(at, 5, ids);
       words.push_back(std::move(word));
     }
+    if (task.left_out)
+      for (const std::string& id : task.request.ids) words.insert(words.end(), {"--exclude", id});
     if (!plan.program.empty()) outcome = run_program(std::move(words), scratch.path, plan.timeout);
-    if (!plan.baselines.empty())
+    if (!plan.baselines.empty() && !task.left_out)  // they take nothing out of their dictionary
       baselines = run_program({plan.baselines.string(), (scratch.path / "dataset").string()}, scratch.path,
                               plan.timeout);
   }
@@ -275,6 +291,7 @@ std::string line_of(const Plan& plan, const Task& task) {
   label.pop_back();  // its line end
   blind::JsonWriter json;
   json.open('{').field("key", task.key).key("label").raw(label);
+  if (task.left_out) json.list("excluded", task.request.ids);
   if (outcome) {
     json.field("exit", static_cast<double>(outcome->exit_code)).field("seconds", outcome->seconds);
     json.field("answer", outcome->out).field("error", outcome->err.substr(0, 500));

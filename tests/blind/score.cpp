@@ -71,9 +71,8 @@ Answer read_answer(const std::string& text) {
     a.verdict = j.at("verdict");
     const json& disagreement = j.at("disagreement");
     a.detected = disagreement.at("detected");
-    for (const json& signal : disagreement.at("signals"))
-      if (signal.contains("p_value") && signal["p_value"].is_number())
-        a.p_values.push_back(signal["p_value"]);
+    if (disagreement.contains("p_value") && disagreement["p_value"].is_number())
+      a.p_value = disagreement["p_value"];
     if (const json& where = disagreement.at("where"); !where.empty()) a.where = where[0].at("subsystem");
     read_effects(j, a);
     if (const json& unknown = j.at("unknown"); unknown.is_object()) {
@@ -112,6 +111,7 @@ Case read_case(const std::string& line) {
   Case one;
   one.truth = read_truth(j["label"]);
   one.truth.key = j.value("key", "");
+  if (j.contains("excluded")) one.truth.kind = "left_out";
   if (j.contains("answer")) {
     one.answer = read_answer(j["answer"].get<std::string>());
     one.answer.seconds = number(j, "seconds");
@@ -148,6 +148,7 @@ Judgement judge_case(const Case& one) {
   j.closed = closed_share(t, a);
   j.left_unnamed = a.verdict == "unknown" && a.effects.empty();
   const bool one_name = a.verdict == "named" && a.effects.size() == 1 && a.alternatives.empty();
+  j.asserted = a.verdict == "named" && !a.effects.empty() && a.alternatives.empty();
   j.single_wrong = one_name && !holds(t.ids, a.effects.front()) && a.effects.front() != t.nearest_equal;
   if (t.kind == "single") {
     const std::string& truth = t.ids.front();
@@ -160,6 +161,7 @@ Judgement judge_case(const Case& one) {
   }
   if (t.kind == "pair") {
     j.all_named = holds(a.effects, t.ids[0]) && holds(a.effects, t.ids[1]);
+    j.one_named = holds(a.effects, t.ids[0]) != holds(a.effects, t.ids[1]);
     j.in_set = holds(set, t.ids[0]) && holds(set, t.ids[1]);
   }
   if (t.kind == "unknown") {

@@ -13,7 +13,7 @@ namespace blind {
 
 /// What a label says, as far as it is scored.
 struct Truth {
-  std::string key, kind, noise, side, signal;  ///< kind: none, single, pair or unknown
+  std::string key, kind, noise, side, signal;  ///< kind: none, single, pair, unknown or left_out
   double ratio = 0;                            ///< asked for
   bool testable = true;
   std::vector<std::string> ids, subsystems, depends_on;
@@ -27,9 +27,9 @@ struct Answer {
   std::string failed, verdict, where, signal;
   bool detected = false;
   std::vector<std::string> effects, alternatives, depends_on;
-  std::vector<double> confidences;      ///< of `effects`
-  std::vector<std::string> subsystems;  ///< of `effects`
-  std::vector<double> p_values;
+  std::vector<double> confidences;                            ///< of `effects`
+  std::vector<std::string> subsystems;                        ///< of `effects`
+  double p_value = -1;                                        ///< over the whole search; −1: not given
   double heldout_before = 0, heldout_after = 0, seconds = 0;  ///< zero when not given
 };
 
@@ -48,6 +48,8 @@ struct Judgement {
   bool first = false, first_three = false, in_set = false;
   bool single_wrong = false;  ///< one name, wrong, and nothing says that it might be
   bool all_named = false;     ///< of two hidden effects both
+  bool one_named = false;     ///< of two hidden effects just one
+  bool asserted = false;      ///< named, and nothing beside it says that it might be another
   bool left_unnamed = false, right_variables = false, right_side = false;
   int set_size = 0;
   double closed =
@@ -55,6 +57,15 @@ struct Judgement {
 };
 
 Judgement judge_case(const Case& one);
+
+/// How far p-values are from uniform: the largest share by which values up to some p are too many (`small`: an alarm more
+/// than p promises) or too few (`large`). Values k/N, 100 ≤ N ≤ 10000, as a count of random trials gives them, are held against
+/// the uniform law on that grid, equal ones together; a distance counts nothing between two steps of the grid.
+struct PDistance {
+  double small = 0, large = 0;
+  double limit = 0;  ///< of either in 19 of 20 cases, were they uniform (on a grid: in more)
+};
+PDistance p_distance(std::vector<double> p_values);
 
 /// Every baseline beside the answer, on the datasets that both were given: a table as Markdown, empty where there is none.
 std::string methods_table(const std::vector<Case>& cases);

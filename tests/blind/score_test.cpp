@@ -88,6 +88,7 @@ TEST(Score, wants_both_of_two_effects) {
   EXPECT_TRUE(judge_case(one).all_named);
   one.answer = named({"leak"}, {"creep"});
   EXPECT_FALSE(judge_case(one).all_named);
+  EXPECT_TRUE(judge_case(one).one_named);
   EXPECT_TRUE(judge_case(one).in_set);
 }
 
@@ -136,6 +137,54 @@ TEST(Score, counts_false_alarms_by_kind_of_noise) {
     if (i == 0) one.answer = named({"creep"});
   }
   EXPECT_NE(report(cases).find("| coloured | 3/4 = 75.0 %"), std::string::npos) << report(cases);
+}
+
+TEST(Score, tells_how_a_dataset_ended_whose_effect_has_no_name_any_more) {
+  std::vector<Case> cases(4, single("creep"));
+  for (Case& one : cases) one.truth.kind = "left_out";
+  cases[0].answer.verdict = "unknown";
+  cases[0].answer.detected = true;
+  cases[1].answer = named({"hysteresis"}, {"leak"});
+  cases[2].answer = named({"hysteresis", "leak"});  // two names are no less sure than one
+  cases[3].answer.verdict = "none";
+  const std::string text = report(cases);
+  const std::string quarter = " 1/4 = 25.0 % (4.6 to 69.9) |";
+  EXPECT_NE(text.find("| white |" + quarter + quarter + quarter + quarter), std::string::npos) << text;
+  EXPECT_NE(text.find("creep as hysteresis (1)"), std::string::npos) << text;
+  EXPECT_EQ(text.find("Confusion matrix: hidden, and named first\n\n| hidden | datasets | right | also named "
+                      "(datasets) |\n|---|---|---|---|\n| creep"),
+            std::string::npos)
+      << "no name could be right";
+}
+
+TEST(Score, reads_from_a_line_that_the_effect_was_left_out) {
+  const std::string label =
+      R"({"kind":"single","noise":"white","side":"process","ratio_asked":0.75,"testable":true,"ids":["creep"],)"
+      R"("subsystems":["muscle"],"depends_on":[],"gap":{},"oracle":null})";
+  EXPECT_EQ(read_case(R"({"key":"k","label":)" + label + "}").truth.kind, "single");
+  EXPECT_EQ(read_case(R"({"key":"k","label":)" + label + R"(,"excluded":["creep"]})").truth.kind, "left_out");
+}
+
+TEST(Score, counts_p_values_on_their_grid_and_equal_ones_together) {
+  // Each value of the grid once: uniform to the last step.
+  std::vector<double> p;
+  for (int k = 1; k <= 200; ++k) p.push_back(k / 200.0);
+  EXPECT_NEAR(p_distance(p).small, 0.0, 1e-12);
+  EXPECT_NEAR(p_distance(p).large, 0.0, 1e-12);
+  // A test that says 1 every second time (a doubled and capped p) is silent too often, and never alarms too often.
+  for (double& value : p) value = value > 0.5 ? 1.0 : value;
+  EXPECT_NEAR(p_distance(p).small, 0.0, 1e-12);
+  EXPECT_NEAR(p_distance(p).large, 0.495, 1e-12);  // 0.995, the step before 1, against the half that is below
+  // Twice as many small ones as promised: at p = 1/2 all are there.
+  for (std::size_t i = 0; i < p.size(); ++i) p[i] = static_cast<double>(i + 1) / 400.0;
+  EXPECT_NEAR(p_distance(p).small, 0.5, 1e-12);
+  EXPECT_NEAR(p_distance(p).large, 0.0, 1e-12);
+  // Without a grid both ends of every step count.
+  EXPECT_NEAR(p_distance({0.5 + 1e-6 / 3}).large, 0.5, 1e-5);
+  EXPECT_NEAR(p_distance({1.0, 1.0, 1.0}).large, 0.99, 1e-12)
+      << "a test that is always silent is not uniform";
+  // Kolmogorov's table at n = 20, 5 %: 0.294.
+  EXPECT_NEAR(p_distance(std::vector<double>(20, 0.5)).limit, 0.294, 0.002);
 }
 
 TEST(Score, puts_every_baseline_beside_the_answer_on_the_same_dataset) {
