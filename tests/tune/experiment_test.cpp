@@ -119,6 +119,44 @@ TEST(PlantFit, refuses_a_joint_that_is_no_lag) {
   EXPECT_NE(fit_plant(relay.excited(), {.time_scale = relay.describing_function().period}).refusal, "");
 }
 
+/// Three rounds of steps on `plant`, fitted.
+PlantFit stepped(const test::KnownPlant& plant, double interval, std::uint64_t seed) {
+  simulate::Random random(seed, 1);
+  const double period = 2 * kPi / plant.critical();
+  StepSeries steps({.reach = 4e4, .settle = 0.5, .longest = 60, .interval = interval},
+                   {.height = 3e4, .hold = 6 * period});
+  test::play(steps, plant, interval, random);
+  EXPECT_EQ(steps.state(), Experiment::State::kDone);
+  return fit_plant(steps.excited(), {.time_scale = period, .noise = steps.noise()});
+}
+
+TEST(PlantFit, every_row_counts_however_many_there_are) {
+  test::KnownPlant plant = testbed_plant();
+  plant.dead_time = 0.012;  // whole parts of both ticks
+  plant.noise = 0.01 * 3e4 * plant.gain;
+  const PlantFit few = stepped(plant, 0.004, 11), many = stepped(plant, 0.0005, 12);
+  ASSERT_EQ(few.refusal + many.refusal, "");
+  // Eight times the rows of white noise: 0.35; a residual for every n-th row alone gave 0.7 to 0.8.
+  for (const char* name : {"K_crit", "T_crit", "T_A"})
+    EXPECT_LT(value_of(many, name).std_error, 0.55 * value_of(few, name).std_error) << name;
+}
+
+TEST(PlantFit, a_lead_beyond_all_lags_is_met_by_dead_time_below_zero) {
+  test::KnownPlant plant = testbed_plant();
+  plant.lags = {0.17, 0.006};
+  plant.lead = 0.012;  // 6 ms more than the second lag, and no dead time that could take them up
+  plant.damping = 0.5;
+  plant.noise = 0.002 * 3e4 * plant.gain;
+  const double gain = 1 / plant.size(plant.critical());
+  const PlantFit fit = stepped(plant, 0.001, 13);
+  ASSERT_EQ(fit.refusal, "");
+  const Estimated& e = value_of(fit, "K_crit");
+  EXPECT_NEAR(e.value * kKg, gain, 0.02 * gain);
+  EXPECT_LT(e.ci_low * kKg, gain);
+  EXPECT_GT(e.ci_high * kKg, gain);
+  EXPECT_EQ(fit.plant.dead_time, 0);  // the joint's model knows no lead
+}
+
 TEST(ClosedLoop, simulated_loop_dies_away_inside_the_linear_gain_margin_and_swings_up_outside) {
   JointModel joint = testbed_model();
   joint.muscle.C = 0;

@@ -30,8 +30,8 @@ std::string refusal_of(const PlantFit& fit, const PlantFitOptions& options) {
 }
 
 /// Akaike's weight of the form with one parameter more.
-double weight_of_bent(const PlantProblem& problem, const PlantSolution& plain, const PlantSolution& bent) {
-  const double gained = static_cast<double>(problem.residuals()) * std::log(plain.cost / bent.cost);
+double weight_of_bent(const PlantProblem& problem, const PlantSolution& shifted, const PlantSolution& bent) {
+  const double gained = static_cast<double>(problem.residuals()) * std::log(shifted.cost / bent.cost);
   return 1 / (1 + std::exp(0.5 * (2 - gained)));
 }
 
@@ -116,12 +116,15 @@ PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& option
   for (const Fact& fact : parameter_facts())
     fit.parameters.push_back(estimated(fact, problem, best.x, spread));
   for (Estimated& e : fit.parameters) e.ci_low = e.ci_low < 0 ? 0 : e.ci_low;  // none can be negative
-  const PlantSolution bent = solve(problem, best.x, Form::kBentLag);
-  const Spread freer = spread_of(problem, bent.x, Form::kBentLag);
-  const double weight = weight_of_bent(problem, best, bent);
+  // What follows from the plant is taken in orders of s: dead time of either sign first, then the bend.
+  const PlantSolution shifted = solve(problem, best.x, Form::kShiftedLag);
+  const PlantSolution bent = solve(problem, shifted.x, Form::kBentLag);
+  const Spread first = spread_of(problem, shifted.x, Form::kShiftedLag);
+  const Spread second = spread_of(problem, bent.x, Form::kBentLag);
+  const double weight = weight_of_bent(problem, shifted, bent);
   for (const Fact& fact : derived_facts())
     fit.derived.push_back(
-        joined(estimated(fact, problem, best.x, spread), estimated(fact, problem, bent.x, freer), weight));
+        joined(estimated(fact, problem, shifted.x, first), estimated(fact, problem, bent.x, second), weight));
   for (const Fact& fact : joint_facts()) fit.derived.push_back(estimated(fact, problem, best.x, spread));
   fit.refusal = refusal_of(fit, options);
   if (fit.refusal.empty()) fit.refusal = disagreement_of(problem, best, solutions);

@@ -5,8 +5,9 @@
 ///   load that begins with the excitation (an angle set by another Δp, a creeping rest)
 ///   φ(t): the exact answer to the command as it was held (linear_step.hpp), so relay, ramp and steps are one problem
 ///   covariance: sandwich over blocks of time (estimate/block_covariance.hpp), Student's t; what follows by the delta method
-///   the same again with (1 + q s²) behind the lags and L of either sign; K_crit … T_L_T_A are the mean of both forms with Akaike's
-///   weights, and their errors hold the difference (plant_spread.hpp): that is how lags and leads that were not thought of are paid for
+///   the same again with L of either sign, and with (1 + q s²) behind the lags too; K_crit … T_L_T_A are the mean of these two forms with
+///   Akaike's weights, and their errors hold the difference (plant_spread.hpp): that is how lags and leads that were not thought of are
+///   paid for
 /// A plant with other lags than these is met well near the frequencies at which it was excited, which is where K_crit lies.
 /// `judge` refuses: cost not converged, more than `worst_misfit` of the motion left over, K_crit or T_crit not known to
 /// `worst_error`, dead time or lag at the end of its range in a way that K_crit feels.

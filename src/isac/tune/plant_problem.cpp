@@ -12,7 +12,7 @@
 namespace isac::tune {
 namespace {
 
-constexpr std::size_t kRowsWanted = 3000;  // of residuals; the command is never thinned
+constexpr std::size_t kRowsWanted = 3000;  // of residuals; what is between them is averaged, not left out
 
 void simulate_record(const PlantProblem& problem, const PlantVector& x, std::vector<double>& angle) {
   thread_local std::vector<double> command;
@@ -52,8 +52,10 @@ bool residuals_of(const PlantProblem& problem, const PlantVector& x, double* res
   thread_local std::vector<double> angle;
   simulate_record(problem, x, angle);
   for (std::size_t k = 0; k < problem.residuals(); ++k) {
-    const std::size_t row = k * problem.thin;
-    residuals[k] = (problem.record.angle[row] - angle[row]) / problem.size - x[kOffset];
+    double sum = 0;
+    for (std::size_t row = k * problem.thin; row < (k + 1) * problem.thin; ++row)
+      sum += problem.record.angle[row] - angle[row];
+    residuals[k] = sum / (static_cast<double>(problem.thin) * problem.size) - x[kOffset];
     if (!std::isfinite(residuals[k])) return false;
   }
   return true;
@@ -143,13 +145,13 @@ PlantSolution solve(const PlantProblem& problem, const PlantVector& start, Form 
   }
   p.SetParameterLowerBound(s.x.data(), kLogDamping, std::log(0.005));
   p.SetParameterUpperBound(s.x.data(), kLogDamping, std::log(20.0));
-  p.SetParameterLowerBound(s.x.data(), kDeadTime, form == Form::kLag ? 0 : -1);  // a lead beyond all lags
+  p.SetParameterLowerBound(s.x.data(), kDeadTime, form == Form::kLag ? 0 : -1);
   p.SetParameterUpperBound(s.x.data(), kDeadTime, 5);
   p.SetParameterLowerBound(s.x.data(), kBend, -1);
   p.SetParameterUpperBound(s.x.data(), kBend, 1);
   std::vector<int> held;
   if (!problem.fit_dead_time) held.push_back(kDeadTime);
-  if (form == Form::kLag) held.push_back(kBend);
+  if (form != Form::kBentLag) held.push_back(kBend);
   if (!held.empty()) p.SetManifold(s.x.data(), new ceres::SubsetManifold(kPlantUnknowns, held));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;

@@ -2,7 +2,7 @@
 /// The least squares behind plant_fit.hpp: a record on an even grid, its residuals, where to begin, one solution.
 ///
 ///   x = (log K, log T_C, log T_J, log ζ, L/scale, φ_0/size, load/reach, q/scale²);  `Form` says which of them are searched for
-///   r_k = (φ_k − φ(t_k; x))/size − φ_0/size                                            every `thin`-th row
+///   r_k = (φ_k − φ(t_k; x))/size − φ_0/size                                            averaged over `thin` rows
 /// Units: SI inside the plant, x and r without. Threads: pure. Errors: plant_problem() throws isac::Error "no_usable_data".
 /// Source: docs/derivations/tuning.md. Example: `solve(problem, starts_of(problem).front().x, Form::kLag)`.
 #pragma once
@@ -29,17 +29,18 @@ enum PlantUnknown {
 };
 using PlantVector = std::array<double, kPlantUnknowns>;
 
-/// The joint's own form, or with (1 + q s²): what it needs there says how far the record is from the form.
-enum class Form { kLag, kBentLag };
+/// The joint's own form; the same with L of either sign (a lead beyond all lags is dead time below zero); and with (1 + q s²)
+/// too: what it needs there says how far the record is from the form.
+enum class Form { kLag, kShiftedLag, kBentLag };
 
 struct PlantProblem {
   ExperimentRecord record;   ///< on an even grid
   std::vector<double> load;  ///< 0 at rest, the command's reach from its first change on
   double interval = 0, size = 1, scale = 1, known_dead_time = 0;
   bool fit_dead_time = true;
-  std::size_t thin = 1;  ///< every how many rows a residual is taken
+  std::size_t thin = 1;  ///< rows to a residual
 
-  [[nodiscard]] std::size_t residuals() const { return (record.time.size() + thin - 1) / thin; }
+  [[nodiscard]] std::size_t residuals() const { return record.time.size() / thin; }
 };
 
 [[nodiscard]] PlantProblem plant_problem(const ExperimentRecord& record, const PlantFitOptions& options);

@@ -44,7 +44,7 @@ void set_interval(Estimated& e, double freedom) {
 
 Spread spread_of(const PlantProblem& problem, const PlantVector& x, Form form) {
   std::vector<int> free = {kLogGain, kLogLag, kLogTime, kLogDamping, kOffset, kLoad};
-  if (problem.fit_dead_time && (form == Form::kBentLag || x[kDeadTime] > kLeastDeadTime))
+  if (problem.fit_dead_time && (form != Form::kLag || x[kDeadTime] > kLeastDeadTime))
     free.push_back(kDeadTime);
   if (form == Form::kBentLag) free.push_back(kBend);
   const Eigen::MatrixXd jacobian = jacobian_of(problem, x, free);
@@ -140,12 +140,12 @@ Estimated estimated(const Fact& fact, const PlantProblem& problem, const PlantVe
   return e;
 }
 
-Estimated joined(const Estimated& plain, const Estimated& bent, double weight) {
-  Estimated e = plain;
-  e.value += weight * (bent.value - plain.value);
-  e.std_error = std::hypot(std::max(plain.std_error, bent.std_error), bent.value - plain.value);
+Estimated joined(const Estimated& shifted, const Estimated& bent, double weight) {
+  Estimated e = shifted;
+  e.value += weight * (bent.value - shifted.value);
+  e.std_error = std::hypot(std::max(shifted.std_error, bent.std_error), bent.value - shifted.value);
   e.ci_low = e.ci_high = std::numeric_limits<double>::quiet_NaN();
-  const Estimated& wider = bent.std_error > plain.std_error ? bent : plain;
+  const Estimated& wider = bent.std_error > shifted.std_error ? bent : shifted;
   const double factor = (wider.ci_high - wider.value) / wider.std_error;  // Student's, of the one that counts
   if (!std::isfinite(e.std_error) || !std::isfinite(factor)) return e;
   e.ci_low = e.value - factor * e.std_error;

@@ -3,7 +3,7 @@
 ///
 ///   V        sandwich over blocks of time (estimate/block_covariance.hpp), and σ² H⁻¹ as if the residuals were white
 ///   a fact   f(x̂) with the greater of ∇f V ∇f of the two, Student's t with Satterthwaite's degrees of freedom
-///   joined   f̂ = (1 − w) f_plain + w f_bent,  s² = max(s_plain, s_bent)² + (f_bent − f_plain)²;  w: Akaike's weight
+///   joined   f̂ = (1 − w) f_shifted + w f_bent,  s² = max(s_shifted, s_bent)² + (f_bent − f_shifted)²;  w: Akaike's weight
 /// The blocks do not see a misfit that repeats with every cycle; what a freer form would say in its place does.
 ///
 /// Units: each fact's own. Threads: pure. Errors: none; NaN where nothing is known, as of a dead time at its bound.
@@ -42,6 +42,6 @@ struct Fact {
                                   const Spread& spread);
 
 /// One fact from two forms; `weight` is that of the bent one.
-[[nodiscard]] Estimated joined(const Estimated& plain, const Estimated& bent, double weight);
+[[nodiscard]] Estimated joined(const Estimated& shifted, const Estimated& bent, double weight);
 
 }  // namespace isac::tune
