@@ -119,6 +119,27 @@ TEST(PlantFit, refuses_a_joint_that_is_no_lag) {
   EXPECT_NE(fit_plant(relay.excited(), {.time_scale = relay.describing_function().period}).refusal, "");
 }
 
+TEST(PlantFit, a_late_first_stamp_does_not_shift_angles_against_commands) {
+  // Ticks of 1 ms stamped up to 0.2 ms late, the first and the last by the most; the angle is the time of the tick itself.
+  simulate::Random random(10, 1);
+  ExperimentRecord record;
+  const int n = 2000;
+  for (int k = 0; k < n; ++k) {
+    const double late = k == 0 || k == n - 1 ? 2e-4 : 2e-4 * random.uniform();
+    record.time.push_back(1e-3 * k + late);
+    record.command.push_back(k);
+    record.angle.push_back(1e-3 * k);
+  }
+  const ExperimentRecord even = even_record(record);
+  ASSERT_EQ(even.angle.size(), record.angle.size());
+  double shift = 0;
+  for (std::size_t k = 0; k < even.angle.size(); ++k) {
+    shift += (even.angle[k] - 1e-3 * even.command[k]) / n;
+    ASSERT_EQ(even.command[k], k);
+  }
+  EXPECT_NEAR(shift, 0, 1e-5);  // laid from the first stamp it was 1e-4
+}
+
 /// Three rounds of steps on `plant`, fitted.
 PlantFit stepped(const test::KnownPlant& plant, double interval, std::uint64_t seed) {
   simulate::Random random(seed, 1);

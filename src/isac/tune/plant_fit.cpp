@@ -56,17 +56,27 @@ ExperimentRecord even_record(const ExperimentRecord& record) {
   for (std::size_t k = 1; k < n; ++k) steps[k - 1] = record.time[k] - record.time[k - 1];
   std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
   // The median finds the period where ticks were lost, but not to one part in their number: every step is counted in whole periods,
-  // and the grid lays their sum over the whole length. Else rows and ticks would drift apart, and commands with them.
-  const double median = steps[steps.size() / 2], length = record.time.back() - record.time.front();
-  double periods = 0;
-  for (const double step : steps) periods += std::max(0.0, std::floor(step / median + 0.5));
-  periods = std::max(1.0, periods);
-  const double interval = length / periods;
-  const auto rows = static_cast<std::size_t>(periods) + 1;
+  // and the grid is the line through all stamps over their counts. A period that is off would let rows and commands drift apart, and a
+  // grid that hangs on one trembling stamp would shift all angles against all commands, which is a dead time.
+  const double median = steps[steps.size() / 2];
+  std::vector<double> count(n, 0.0);
+  double mean_count = 0, mean_time = 0, squares = 0, products = 0;
+  for (std::size_t k = 1; k < n; ++k)
+    count[k] = count[k - 1] + std::max(0.0, std::floor((record.time[k] - record.time[k - 1]) / median + 0.5));
+  for (std::size_t k = 0; k < n; ++k) {
+    mean_count += count[k] / static_cast<double>(n);
+    mean_time += record.time[k] / static_cast<double>(n);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    squares += (count[k] - mean_count) * (count[k] - mean_count);
+    products += (count[k] - mean_count) * (record.time[k] - mean_time);
+  }
+  const double interval = products / squares, start = mean_time - interval * mean_count;
+  const auto rows = static_cast<std::size_t>(count.back()) + 1;
   ExperimentRecord even;
   std::size_t at = 0;
   for (std::size_t k = 0; k < rows; ++k) {
-    const double t = record.time.front() + static_cast<double>(k) * interval;
+    const double t = start + static_cast<double>(k) * interval;
     while (at + 1 < n && record.time[at + 1] <= t) ++at;
     const std::size_t next = std::min(at + 1, n - 1);
     const double gap = record.time[next] - record.time[at];
