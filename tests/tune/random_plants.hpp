@@ -92,46 +92,60 @@ inline KnownTangent tangent_of(const KnownPlant& plant) {
   return best;
 }
 
+/// How a plant moves from rest under a command held over parts of a tick.
+class PlantMotion {
+ public:
+  PlantMotion(const KnownPlant& plant, double part)
+      : plant_(plant),
+        part_(part),
+        lag_(plant.lags.size(), 0.0),
+        tube_(static_cast<std::size_t>(std::lround(plant.dead_time / part)), 0.0) {}
+
+  [[nodiscard]] double angle() const { return plant_.time_constant > 0 ? angle_ : lag_.back(); }
+
+  void advance(double u) {
+    const double h = part_;
+    tube_.push_back(u);
+    double x = plant_.gain * tube_.front();
+    tube_.pop_front();
+    for (std::size_t i = 0; i < lag_.size(); ++i) {  // exact for what is held over the part
+      const double before = lag_[i];
+      lag_[i] = x + (lag_[i] - x) * std::exp(-h / plant_.lags[i]);
+      // the lead is on the first lag: (1 + T_z s)/(1 + T s) = T_z/T + (1 − T_z/T)/(1 + T s); what goes on is the middle of the part
+      const double share = i == 0 ? plant_.lead / plant_.lags[0] : 0.0;
+      x = share * x + (1 - share) * 0.5 * (before + lag_[i]);
+    }
+    if (plant_.time_constant <= 0) return;
+    const double w = 1 / plant_.time_constant;  // Runge-Kutta with x at the middle of the part
+    const auto pull = [&](double a, double v) { return w * w * (x - a) - 2 * plant_.damping * w * v; };
+    const double k1 = pull(angle_, speed_), k2 = pull(angle_ + h / 2 * speed_, speed_ + h / 2 * k1);
+    const double k3 = pull(angle_ + h / 2 * (speed_ + h / 2 * k1), speed_ + h / 2 * k2);
+    const double k4 = pull(angle_ + h * (speed_ + h / 2 * k2), speed_ + h * k3);
+    angle_ += h * (speed_ + h / 6 * (k1 + k2 + k3));
+    speed_ += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
+  }
+
+ private:
+  KnownPlant plant_;
+  double part_, angle_ = 0, speed_ = 0;
+  std::vector<double> lag_;
+  std::deque<double> tube_;
+};
+
+constexpr int kParts = 10;  // of a tick
+
 /// Plays an experiment on a plant; returns it finished. Ticks tremble by a share of the interval.
 inline void play(tune::Experiment& experiment, const KnownPlant& plant, double interval,
                  simulate::Random& random) {
-  const int parts = 10;
-  const double h = interval / parts;
-  std::vector<double> lag(plant.lags.size(), 0.0);
-  double angle = 0, speed = 0;
-  std::deque<double> tube(static_cast<std::size_t>(std::lround(plant.dead_time / h)), 0.0);
+  PlantMotion motion(plant, interval / kParts);
   for (int tick = 0; !experiment.finished(); ++tick) {
-    double y = angle;
-    if (plant.time_constant <= 0) y = lag.back();
-    double seen = y + plant.noise * random.normal();
+    double seen = motion.angle() + plant.noise * random.normal();
     if (plant.step > 0) seen = plant.step * std::round(seen / plant.step);
     double u = experiment.step(tick * interval + 0.02 * interval * random.uniform(), seen) -
                experiment.settings().centre;
     u = std::clamp(u, -plant.saturation, plant.saturation);
     if (experiment.state() == tune::Experiment::State::kExcite) u += plant.load;
-    for (int n = 0; n < parts; ++n) {
-      tube.push_back(u);
-      double x = plant.gain * tube.front();
-      tube.pop_front();
-      for (std::size_t i = 0; i < lag.size(); ++i) {  // exact for what is held over the part
-        const double before = lag[i];
-        lag[i] = x + (lag[i] - x) * std::exp(-h / plant.lags[i]);
-        // the lead is on the first lag: (1 + T_z s)/(1 + T s) = T_z/T + (1 − T_z/T)/(1 + T s)
-        const double out = i == 0 && plant.lead > 0
-                               ? plant.lead / plant.lags[0] * x + (1 - plant.lead / plant.lags[0]) * lag[0]
-                               : 0.5 * (before + lag[i]);
-        x = out;
-      }
-      if (plant.time_constant > 0) {
-        const double w = 1 / plant.time_constant;  // Runge-Kutta with x at the middle of the part
-        const auto pull = [&](double a, double v) { return w * w * (x - a) - 2 * plant.damping * w * v; };
-        const double k1 = pull(angle, speed), k2 = pull(angle + h / 2 * speed, speed + h / 2 * k1);
-        const double k3 = pull(angle + h / 2 * (speed + h / 2 * k1), speed + h / 2 * k2);
-        const double k4 = pull(angle + h * (speed + h / 2 * k2), speed + h * k3);
-        angle += h * (speed + h / 6 * (k1 + k2 + k3));
-        speed += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);
-      }
-    }
+    for (int n = 0; n < kParts; ++n) motion.advance(u);
   }
 }
 

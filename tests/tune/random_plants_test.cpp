@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <complex>
 #include <iostream>
 
 #include "isac/core/units.hpp"
@@ -74,6 +75,28 @@ PlantFit failed(const Experiment& experiment) {
   fit.refusal = experiment.failure();
   EXPECT_FALSE(fit.refusal.empty());
   return fit;
+}
+
+/// What is played must be what the truth is worked out from: half a part of a tick is five standard errors of T_L on a quiet joint.
+TEST(RandomPlants, move_as_their_transfer_functions_say) {
+  for (int i = 0; i < 30; ++i) {
+    simulate::Random random(4000 + static_cast<std::uint64_t>(i), 1);
+    const KnownPlant plant = test::random_plant(random, i % 3);
+    const double w = plant.critical(), part = kInterval / test::kParts;
+    test::PlantMotion motion(plant, part);
+    const auto period = static_cast<int>(std::lround(2 * M_PI / (w * part)));
+    const double played = 2 * M_PI / (period * part);  // rad/s, a whole number of parts to a period
+    std::complex<double> harmonic = 0;
+    constexpr int kSettle = 60;
+    for (int k = 0; k < (kSettle + 1) * period; ++k) {
+      // Held over a part, a sine comes half a part late; so it is taken from the part's middle.
+      if (k >= kSettle * period) harmonic += motion.angle() * std::polar(2.0 / period, -played * k * part);
+      motion.advance(std::cos(played * (k + 0.5) * part));
+    }
+    const double late = std::remainder(plant.phase(played) - std::arg(harmonic), 2 * M_PI) / played;
+    EXPECT_NEAR(late, 0, 2e-6) << "s, plant " << i;
+    EXPECT_NEAR(std::abs(harmonic) / plant.size(played), 1, 1e-4) << "plant " << i;
+  }
 }
 
 TEST(RandomPlants, relay_finds_gain_and_period_within_five_percent_or_refuses) {
