@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "isac/core/units.hpp"
+#include "isac/simulate/random.hpp"
 #include "isac/tune/linear_step.hpp"
 
 namespace isac::tune {
@@ -117,6 +118,31 @@ TEST(Rules, joint_latency_goes_over_smoothly_from_swinging_to_creeping) {
              above = joint_step_shape({1, 0.1, 0.04, 1.0001, 0});
   EXPECT_NEAR(below.latency, above.latency, 2e-4 * below.latency);  // ζ itself differs by 2e-4
   EXPECT_NEAR(below.adjustment, above.adjustment, 5e-4 * below.adjustment);
+}
+
+TEST(LinearStep, means_over_rows_are_those_of_the_answer_for_every_dead_time_and_number_of_rows) {
+  simulate::Random random(11, 1);
+  std::vector<double> command(1003);
+  for (double& u : command) u = random.normal();
+  std::vector<double> mean;
+  for (const double dead_time : {-0.0123, -0.001, 0.0, 0.0005, 0.003, 0.0217, 2.0})
+    for (const std::size_t rows : {1, 2, 7, 40}) {
+      const LagPlant plant{.gain = 2,
+                           .lag = 0.05,
+                           .time_constant = 0.02,
+                           .damping = 0.3,
+                           .dead_time = dead_time,
+                           .bend = 1e-4};
+      const std::vector<double> angle = simulate(plant, 0.001, command);
+      simulate_means_into(plant, 0.001, command, rows, mean);
+      ASSERT_EQ(mean.size(), command.size() / rows);
+      for (std::size_t b = 0; b < mean.size(); ++b) {
+        double sum = 0;
+        for (std::size_t k = b * rows; k < (b + 1) * rows; ++k) sum += angle[k];
+        ASSERT_NEAR(mean[b], sum / static_cast<double>(rows), 1e-12)
+            << dead_time << " s, " << rows << " rows";
+      }
+    }
 }
 
 TEST(LinearStep, answers_are_those_of_the_closed_form_for_a_dead_time_between_samples) {

@@ -34,6 +34,35 @@ Step step_of(const Matrix4& system, double time) {
   return {e.topLeftCorner<3, 3>(), e.topRightCorner<3, 1>()};
 }
 
+/// From one row to the next, and what is read: x_k+1 = Φ x_k + Γ_old u_k−whole−1 + Γ_new u_k−whole, φ_k = read · x_k.
+struct Row {
+  Eigen::Matrix3d phi;
+  State old_gain, new_gain, read;
+  std::ptrdiff_t whole;  ///< rows of dead time
+};
+Row row_of(const LagPlant& plant, double interval) {
+  const Matrix4 system = system_of(plant);
+  const double behind = plant.dead_time / interval, whole = std::floor(behind);
+  const double part = (behind - whole) * interval;  // the older command still acts this long
+  const Step first = step_of(system, part), second = step_of(system, interval - part);
+  const double w = 1 / plant.time_constant, bend = plant.bend;
+  return {.phi = second.phi * first.phi,
+          .old_gain = second.phi * first.gamma,
+          .new_gain = second.gamma,
+          .read = State(bend * w * w, 1 - bend * w * w, -2 * bend * plant.damping * w),  // φ + q φ̈
+          .whole = static_cast<std::ptrdiff_t>(whole)};
+}
+
+/// At a dead time of 0 a derivative's step goes below it: the command is then asked for ahead, and held after its last row.
+struct Delayed {
+  std::span<const double> command;
+  std::ptrdiff_t whole;
+  double operator()(std::ptrdiff_t k) const {
+    const auto last = static_cast<std::ptrdiff_t>(command.size()) - 1;
+    return command[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k - whole, 0, last))] - command[0];
+  }
+};
+
 /// Derivatives of a unit step's answer at a state, without the bend; `fourth` behind the step.
 struct Derivatives {
   double first, second, third, fourth;
@@ -81,27 +110,48 @@ models::StepShape<double> tangent_of(const LagPlant& plant) {
 
 void simulate_into(const LagPlant& plant, double interval, std::span<const double> command,
                    std::vector<double>& angle) {
-  const Matrix4 system = system_of(plant);
-  const double behind = plant.dead_time / interval;
-  const auto whole = static_cast<std::ptrdiff_t>(std::floor(behind));
-  const double part =
-      (behind - static_cast<double>(whole)) * interval;  // the older command still acts this long
-  const Step first = step_of(system, part), second = step_of(system, interval - part);
-  const Eigen::Matrix3d phi = second.phi * first.phi;
-  const State old_gain = second.phi * first.gamma, new_gain = second.gamma;
-  // At a dead time of 0 a derivative's step goes below it: the command is then asked for ahead, and held after its last row.
-  const auto last = static_cast<std::ptrdiff_t>(command.size()) - 1;
-  const auto delayed = [&](std::ptrdiff_t k) {
-    return command[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))] - command[0];
-  };
+  const Row row = row_of(plant, interval);
+  const Delayed delayed{command, row.whole};
   State x = State::Zero();
-  const double w = 1 / plant.time_constant, bend = plant.bend;
-  const State read(bend * w * w, 1 - bend * w * w, -2 * bend * plant.damping * w);  // φ + q φ̈
   angle.resize(command.size());
   for (std::size_t k = 0; k < command.size(); ++k) {
-    angle[k] = read.dot(x);
-    const auto now = static_cast<std::ptrdiff_t>(k) - whole;
-    x = (phi * x + old_gain * delayed(now - 1) + new_gain * delayed(now)).eval();
+    angle[k] = row.read.dot(x);
+    const auto now = static_cast<std::ptrdiff_t>(k);
+    x = (row.phi * x + row.old_gain * delayed(now - 1) + row.new_gain * delayed(now)).eval();
+  }
+}
+
+void simulate_means_into(const LagPlant& plant, double interval, std::span<const double> command,
+                         std::size_t rows, std::vector<double>& mean) {
+  const Row row = row_of(plant, interval);
+  const auto n = static_cast<Eigen::Index>(rows), blocks = static_cast<Eigen::Index>(command.size() / rows);
+  // Of x at a block's first row and the commands from one row before it: the sum of φ over the block, and x behind it.
+  Eigen::Matrix<double, 4, 3> from_state = Eigen::Matrix<double, 4, 3>::Zero();
+  from_state.bottomRows<3>().setIdentity();
+  Eigen::Matrix<double, 4, Eigen::Dynamic> from_command(4, n + 1);
+  from_command.setZero();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    from_state.row(0) += row.read.transpose() * from_state.bottomRows<3>();
+    from_command.row(0) += row.read.transpose() * from_command.bottomRows<3>();
+    from_state.bottomRows<3>() = (row.phi * from_state.bottomRows<3>()).eval();
+    from_command.bottomRows<3>() = (row.phi * from_command.bottomRows<3>()).eval();
+    from_command.col(i).tail<3>() += row.old_gain;
+    from_command.col(i + 1).tail<3>() += row.new_gain;
+  }
+  thread_local std::vector<double> held;
+  held.resize(static_cast<std::size_t>(blocks * n + 1));
+  const Delayed delayed{command, row.whole};
+  for (std::size_t k = 0; k < held.size(); ++k) held[k] = delayed(static_cast<std::ptrdiff_t>(k) - 1);
+  const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> windows(held.data(), n + 1, blocks,
+                                                                           Eigen::OuterStride<>(n));
+  thread_local Eigen::Matrix<double, 4, Eigen::Dynamic> forced;
+  forced.noalias() = from_command * windows;
+  mean.resize(static_cast<std::size_t>(blocks));
+  State x = State::Zero();
+  for (Eigen::Index b = 0; b < blocks; ++b) {
+    const Eigen::Vector4d next = from_state * x + forced.col(b);
+    mean[static_cast<std::size_t>(b)] = next[0] / static_cast<double>(n);
+    x = next.tail<3>();
   }
 }
 

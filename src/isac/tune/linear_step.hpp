@@ -2,6 +2,7 @@
 /// The third-order lag in time, exactly: answers to a command that holds between samples, and the tangent of its step.
 ///
 ///   x' = A x + b u(t − L); between two samples the delayed command changes at most once, so two matrix exponentials are exact
+///   means over n rows: Σ_i φ(t_k+i) = R_n x_k + Σ_j c_j u_k+j,  x_k+n = Φ_n x_k + Σ_j Γ_j u_k+j; what does not depend on x is one product of matrices
 ///   T_L = L + t_i − y(t_i)/ẏ(t_i),  T_A = K/ẏ(t_i),  t_i where ẏ of the unit step is greatest                  seed 4.2, figure 4.4
 ///
 /// Units: SI; commands in Pa, angles in rad. Real time: not for the loop. Threads: pure.
@@ -26,6 +27,10 @@ namespace isac::tune {
 /// The same into a buffer of the command's size: no allocation but the first time.
 void simulate_into(const LagPlant& plant, double interval, std::span<const double> command,
                    std::vector<double>& angle);
+
+/// The mean of the same over every `rows` samples, as many as are whole; several times faster than taking it afterwards.
+void simulate_means_into(const LagPlant& plant, double interval, std::span<const double> command,
+                         std::size_t rows, std::vector<double>& mean);
 
 [[nodiscard]] models::StepShape<double> step_shape(const LagPlant& plant);
 /// The same of the joint alone, pressure to angle, without valve unit and dead time; works for every damping.

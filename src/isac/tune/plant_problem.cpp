@@ -14,11 +14,12 @@ namespace {
 
 constexpr std::size_t kRowsWanted = 3000;  // of residuals; what is between them is averaged, not left out
 
-void simulate_record(const PlantProblem& problem, const PlantVector& x, std::vector<double>& angle) {
+/// The command with its load, as the plant saw it.
+const std::vector<double>& loaded_command(const PlantProblem& problem, const PlantVector& x) {
   thread_local std::vector<double> command;
   command = problem.record.command;
   for (std::size_t k = 0; k < command.size(); ++k) command[k] += x[kLoad] * problem.load[k];
-  simulate_into(plant_of(problem, x), problem.interval, command, angle);
+  return command;
 }
 
 struct Misfit {
@@ -43,19 +44,16 @@ LagPlant plant_of(const PlantProblem& problem, const PlantVector& x) {
 
 std::vector<double> motion_of(const PlantProblem& problem, const PlantVector& x) {
   std::vector<double> angle;
-  simulate_record(problem, x, angle);
+  simulate_into(plant_of(problem, x), problem.interval, loaded_command(problem, x), angle);
   for (double& y : angle) y += x[kOffset] * problem.size;
   return angle;
 }
 
 bool residuals_of(const PlantProblem& problem, const PlantVector& x, double* residuals) {
-  thread_local std::vector<double> angle;
-  simulate_record(problem, x, angle);
+  thread_local std::vector<double> mean;
+  simulate_means_into(plant_of(problem, x), problem.interval, loaded_command(problem, x), problem.thin, mean);
   for (std::size_t k = 0; k < problem.residuals(); ++k) {
-    double sum = 0;
-    for (std::size_t row = k * problem.thin; row < (k + 1) * problem.thin; ++row)
-      sum += problem.record.angle[row] - angle[row];
-    residuals[k] = sum / (static_cast<double>(problem.thin) * problem.size) - x[kOffset];
+    residuals[k] = (problem.mean[k] - mean[k]) / problem.size - x[kOffset];
     if (!std::isfinite(residuals[k])) return false;
   }
   return true;
@@ -68,8 +66,8 @@ std::vector<PlantVector> starts_of(const PlantProblem& problem) {
     double cost;
   };
   std::vector<Start> starts;
-  std::vector<double> angle;
-  const auto n = static_cast<double>(problem.record.angle.size());
+  std::vector<double> angle;  // means of it
+  const auto n = static_cast<double>(problem.residuals());
   for (const double lag : {0.1, 0.3, 1.0, 2.5})
     for (const double time : {0.04, 0.12, 0.3})
       for (const double damping : {0.25, 0.9})
@@ -77,10 +75,10 @@ std::vector<PlantVector> starts_of(const PlantProblem& problem) {
           if (!problem.fit_dead_time && dead > 0) continue;
           LagPlant plant{1.0, lag * problem.scale, time * problem.scale, damping,
                          problem.fit_dead_time ? dead * problem.scale : problem.known_dead_time};
-          simulate_into(plant, problem.interval, problem.record.command, angle);
+          simulate_means_into(plant, problem.interval, problem.record.command, problem.thin, angle);
           double sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
           for (std::size_t k = 0; k < angle.size(); ++k) {
-            const double y = problem.record.angle[k];
+            const double y = problem.mean[k];
             sx += angle[k], sy += y, sxx += angle[k] * angle[k], sxy += angle[k] * y, syy += y * y;
           }
           const double spread = n * sxx - sx * sx, gain = (n * sxy - sx * sy) / spread;
@@ -120,6 +118,11 @@ PlantProblem plant_problem(const ExperimentRecord& record, const PlantFitOptions
   problem.size = std::sqrt(squares / static_cast<double>(n));
   if (!(problem.size > 0))
     refuse("the joint did not move; is the experiment's amplitude too small, or the joint held?");
+  for (std::size_t k = 0; k < n / problem.thin; ++k) {
+    const auto from = y.begin() + static_cast<std::ptrdiff_t>(k * problem.thin);
+    const double sum = std::accumulate(from, from + static_cast<std::ptrdiff_t>(problem.thin), 0.0);
+    problem.mean.push_back(sum / static_cast<double>(problem.thin));
+  }
   const double length = problem.record.time.back() - problem.record.time.front();
   problem.scale = std::isfinite(options.time_scale) ? options.time_scale : length / 20;
   problem.fit_dead_time = !std::isfinite(options.dead_time);

@@ -35,12 +35,13 @@ enum class Form { kLag, kShiftedLag, kBentLag };
 
 struct PlantProblem {
   ExperimentRecord record;   ///< on an even grid
+  std::vector<double> mean;  ///< rad, of the angle over `thin` rows
   std::vector<double> load;  ///< 0 at rest, the command's reach from its first change on
   double interval = 0, size = 1, scale = 1, known_dead_time = 0;
   bool fit_dead_time = true;
   std::size_t thin = 1;  ///< rows to a residual
 
-  [[nodiscard]] std::size_t residuals() const { return record.time.size() / thin; }
+  [[nodiscard]] std::size_t residuals() const { return mean.size(); }
 };
 
 [[nodiscard]] PlantProblem plant_problem(const ExperimentRecord& record, const PlantFitOptions& options);
