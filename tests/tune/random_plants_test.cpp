@@ -28,6 +28,8 @@ struct Score {
   int within = 0, wrong = 0, refused = 0;
   double worst = 0;
   std::array<int, kAsked.size()> covered{};
+  int with_lead = 0;  // answers of the kind that is furthest from the fitted form
+  std::array<int, kAsked.size()> covered_with_lead{};
 
   [[nodiscard]] int answers() const { return within + wrong; }
 };
@@ -50,16 +52,20 @@ Score score_of(std::uint64_t seed, Run run) {
     double off = 0;
     for (std::size_t k = 0; k < kAsked.size(); ++k) {
       const Estimated& e = value_of(fit, kAsked[k]);
-      score.covered[k] += e.ci_low <= truth[k] && truth[k] <= e.ci_high ? 1 : 0;
+      const int holds = e.ci_low <= truth[k] && truth[k] <= e.ci_high ? 1 : 0;
+      score.covered[k] += holds;
+      score.covered_with_lead[k] += plant.lead > 0 ? holds : 0;
       if (k < 2) off = std::max(off, std::abs(e.value / truth[k] - 1));
     }
     ++(off <= 0.05 ? score.within : score.wrong);
+    score.with_lead += plant.lead > 0 ? 1 : 0;
     score.worst = std::max(score.worst, off);
   }
   std::cout << "within 5 %: " << score.within << ", wrong: " << score.wrong << ", refused: " << score.refused
             << ", worst " << score.worst << "; 95 % intervals that hold the truth:";
   for (std::size_t k = 0; k < kAsked.size(); ++k)
-    std::cout << " " << kAsked[k] << " " << score.covered[k] << "/" << score.answers();
+    std::cout << " " << kAsked[k] << " " << score.covered[k] << "/" << score.answers() << " (with a lead "
+              << score.covered_with_lead[k] << "/" << score.with_lead << ")";
   std::cout << "\n";
   return score;
 }
