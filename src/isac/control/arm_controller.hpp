@@ -80,7 +80,9 @@ class ArmController {
             .wheel_radius = s.wheel_radius,
             .reference_pressure = s.mean_pressure,
             .stiffness = s.muscle.A,
-            .pressure_gain = s.muscle.B};
+            .pressure_gain = s.muscle.B,
+            .cubic_damping = s.muscle.C,
+            .damping = s.muscle.D};
   }
 
   /// Through the compensation a value that is no number reaches every joint: whose was it? `noticed` if nobody's.

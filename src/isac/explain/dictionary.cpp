@@ -1,3 +1,4 @@
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -216,6 +217,28 @@ Eigen::VectorXd Dictionary::rows(std::size_t column) const {
     out[static_cast<Eigen::Index>(i)] = std::isfinite(v) ? v : 0.0;
   }
   return out;
+}
+
+Eigen::VectorXd beside_generic_functions(const Prepared& data, const Eigen::VectorXd& residual) {
+  Eigen::VectorXd left = residual;
+  const Dictionary generic(data);
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
+    std::vector<Eigen::Index> at;
+    for (std::size_t i = 0; i < data.rows.size(); ++i)
+      if (data.rows[i].chain == chain) at.push_back(static_cast<Eigen::Index>(i));
+    std::vector<std::size_t> columns;
+    for (std::size_t c = 0; c < generic.size(); ++c)
+      if (generic.chain(c) == chain) columns.push_back(c);
+    if (at.size() < 20 * columns.size() || columns.empty()) continue;
+    Eigen::MatrixXd x(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(columns.size()));
+    for (std::size_t c = 0; c < columns.size(); ++c)
+      x.col(static_cast<Eigen::Index>(c)) = generic.rows(columns[c])(at);
+    // Nearly dependent functions, and those that the data does not move, must not blow up.
+    Eigen::MatrixXd gram = x.transpose() * x;
+    for (Eigen::Index c = 0; c < gram.cols(); ++c) gram(c, c) = gram(c, c) * (1 + 1e-6) + 1e-9;
+    left(at) -= x * gram.ldlt().solve(x.transpose() * residual(at));
+  }
+  return left;
 }
 
 }  // namespace isac::explain

@@ -11,17 +11,13 @@
 namespace isac::explain {
 namespace {
 
-/// What the final model leaves over without one of its effects: measured − predicted, weighted; all else as fitted.
+/// What the final model leaves over without one of its effects: measured − predicted in the chains' units; all else as fitted.
 Eigen::VectorXd left_without(const Predictor& predictor, const Found& found, std::size_t effect) {
   ModelPoint model = found.model.model;
   model.effects.erase(model.effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances + effect));
   Eigen::VectorXd predicted = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(model, kAllChains, predicted);
-  Eigen::VectorXd left = predictor.measured() - predicted;
-  for (std::size_t i = 0; i < predictor.rows(); ++i)
-    left[static_cast<Eigen::Index>(i)] /=
-        found.weights.sigma[static_cast<int>(predictor.data().rows[i].chain)];
-  return left;
+  return predictor.measured() - predicted;
 }
 
 /// Chain in which a weight sits most.
@@ -42,16 +38,14 @@ struct Width {
 };
 
 template <class Value>
-Width loop_width(const Prepared& data, const Weights& weights, const Eigen::VectorXd& left, Chain chain,
-                 Value&& by) {
+Width loop_width(const Prepared& data, const Eigen::VectorXd& left, Chain chain, Value&& by) {
   std::vector<std::pair<double, double>> points;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const Row& row = data.rows[i];
     const PreparedRun& run = data.runs[row.run];
     if (row.chain != chain || run.angle.empty() || run.dry_velocity[row.sample] == 0) continue;
     const double sign = run.dry_velocity[row.sample] > 0 ? 1 : -1;
-    points.emplace_back(by(run, row.sample),
-                        -sign * left[static_cast<Eigen::Index>(i)] * weights.sigma[static_cast<int>(chain)]);
+    points.emplace_back(by(run, row.sample), -sign * left[static_cast<Eigen::Index>(i)]);
   }
   Width w;
   if (points.size() < 200) return w;
@@ -69,8 +63,7 @@ Width loop_width(const Prepared& data, const Weights& weights, const Eigen::Vect
 }
 
 /// Fingerprints of explain's key that can be measured: how the loop's width goes with speed and with mean pressure.
-void add_widths(const Predictor& predictor, const Found& found, const Eigen::VectorXd& left, Chain chain,
-                Candidate& c) {
+void add_widths(const Predictor& predictor, const Eigen::VectorXd& left, Chain chain, Candidate& c) {
   const Prepared& data = predictor.data();
   const Label label = label_of(data, chain);
   const auto say = [&](const Width& w, const char* variable) {
@@ -86,11 +79,11 @@ void add_widths(const Predictor& predictor, const Found& found, const Eigen::Vec
                      : change < -0.25 ? "it shrinks"
                                       : "it stays")});
   };
-  say(loop_width(data, found.weights, left, chain,
+  say(loop_width(data, left, chain,
                  [](const PreparedRun& run, std::size_t k) { return std::abs(run.velocity[k]); }),
       "speed");
   if (data.baseline.terms.empty())
-    say(loop_width(data, found.weights, left, chain,
+    say(loop_width(data, left, chain,
                    [](const PreparedRun& run, std::size_t k) {
                      return run.has_pressure ? 0.5 * (run.pressure[0][k] + run.pressure[1][k]) : 0.0;
                    }),
@@ -146,7 +139,9 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
   const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(best.hypothesis)];
   c.closes = closes(found, step, best);
   const Eigen::VectorXd left = left_without(predictor, found, index);
-  const Eigen::VectorXd gain = left.array().square() - found.model.residual.array().square();
+  Eigen::VectorXd weighted = left;
+  weigh(data, found.weights, weighted);
+  const Eigen::VectorXd gain = weighted.array().square() - found.model.residual.array().square();
   const double sigma = std::sqrt(std::max(0.0, gain.sum()) / std::max(step.screen.noise_unit, 1e-12));
   c.evidence.push_back(
       {true,
@@ -167,7 +162,7 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
     c.evidence.push_back({true, fmt::format("Its part in the {} is where the disagreement is: {}.",
                                             label_of(data, chain).signal, share_in_words(at.front()))});
   if (is_friction(h.effect) && (chain == Chain::kTorque || chain == Chain::kMotion))
-    add_widths(predictor, found, left, chain, c);
+    add_widths(predictor, left, chain, c);
   // The nearest rival, and what told it apart.
   for (std::size_t i = 1; i < step.trials.size(); ++i) {
     const Trial& t = step.trials[i];

@@ -29,6 +29,8 @@ class Torque {
       terms_.push_back({e, model.base[j]});
       if (predictor.base()[j].name == "A") point_.stiffness = model.base[j];
       if (predictor.base()[j].name == "B") point_.pressure_gain = model.base[j];
+      if (predictor.base()[j].name == "C") point_.cubic_damping = model.base[j];
+      if (predictor.base()[j].name == "D") point_.damping = model.base[j];
     }
     for (const Active& a : model.effects) {
       const models::EffectInfo& info = a.hypothesis->info();

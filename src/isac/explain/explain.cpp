@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
@@ -12,6 +13,7 @@
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/proof.hpp"
+#include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
 #include "isac/explain/unknown.hpp"
@@ -39,6 +41,12 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
     c.parameters.push_back(e);
   }
   return c;
+}
+
+bool touches_pressures(const Library& library, const Found& found) {
+  return std::any_of(found.added.begin(), found.added.end(), [&](int h) {
+    return (library.hypotheses[static_cast<std::size_t>(h)].chains & kPressureChains) != 0;
+  });
 }
 
 void check_terms(const BaselineModel& baseline) {
@@ -114,9 +122,23 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                     const ExplainOptions& options) {
   check_terms(options.baseline);
   Prepared data = prepare(runs, options.rig, options.baseline, 4.0);
-  Library library = make_library(data, options.excluded);
-  const Predictor predictor(data);
-  Found found = search(predictor, library, data, options);
+  QuietPressure quiet = QuietPressure::learn(data);
+  auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
+  auto predictor_here = std::make_unique<Predictor>(data);
+  Found found = search(*predictor_here, *library_here, data, options);
+  // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
+  std::unique_ptr<Library> first_library;
+  if (touches_pressures(*library_here, found) && (!found.adequate || found.added.size() > 1)) {
+    const ModelPoint valves = found.model.model;
+    first_library = std::move(library_here);
+    quiet = QuietPressure::learn(data, &valves);
+    library_here = std::make_unique<Library>(make_library(data, options.excluded));
+    predictor_here = std::make_unique<Predictor>(data);
+    if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
+    found = search(*predictor_here, *library_here, data, options);
+  }
+  const Library& library = *library_here;
+  const Predictor& predictor = *predictor_here;
 
   Explanation e;
   e.samples = data.rows.size();
@@ -155,7 +177,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (!found.added.empty())
     (void)size_over_floor(data, found.weights, found.floors, found.model.residual - found.baseline.residual,
                           &chain);
-  const Proof proof(heldout, data);
+  const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
   fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
   // A model that does worse on what it has not seen is not an explanation.

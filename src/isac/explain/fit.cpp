@@ -143,6 +143,19 @@ void differentiate(const Predictor& predictor, const ModelPoint& model, const Ei
   out = (out - here) / step;
 }
 
+/// The same, weighted, for a step of the coordinate's scale; 0 in the rows that it does not touch.
+void weighted_slope(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here,
+                    const Coordinate& c, double value, const Weights& weights, Eigen::VectorXd& column) {
+  column = here;
+  differentiate(predictor, model, here, c, value, column);
+  for (std::size_t i = 0; i < predictor.rows(); ++i) {
+    double& slope = column[static_cast<Eigen::Index>(i)];
+    const bool touched = (bit(predictor.data().rows[i].chain) & c.chains) != 0;
+    slope = touched && std::isfinite(slope) ? slope * c.scale : 0.0;
+  }
+  weigh(predictor.data(), weights, column);
+}
+
 class Rows final : public ceres::CostFunction {
  public:
   Rows(const Predictor& predictor, ModelPoint model, std::vector<Coordinate> coordinates,
@@ -150,15 +163,11 @@ class Rows final : public ceres::CostFunction {
       : predictor_(predictor),
         model_(std::move(model)),
         coordinates_(std::move(coordinates)),
+        weights_(weights),
         chains_(chains),
         rows_(rows_of(predictor.data(), chains)) {
     set_num_residuals(static_cast<int>(rows_.size()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(coordinates_.size()));
-    weight_.resize(static_cast<Eigen::Index>(rows_.size()));
-    for (std::size_t i = 0; i < rows_.size(); ++i)
-      weight_[static_cast<Eigen::Index>(i)] =
-          1 /
-          weights.sigma[static_cast<int>(predictor.data().rows[static_cast<std::size_t>(rows_[i])].chain)];
   }
 
   bool at(const Eigen::VectorXd& x, Eigen::VectorXd& residual, Eigen::MatrixXd* jacobian) const {
@@ -167,28 +176,19 @@ class Rows final : public ceres::CostFunction {
       set(model, coordinates_[j], x[static_cast<Eigen::Index>(j)] * coordinates_[j].scale);
     Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_.rows()));
     predictor_.predict(model, chains_, here);
-    const Eigen::VectorXd& measured = predictor_.measured();
     const auto n = static_cast<Eigen::Index>(rows_.size());
     residual.resize(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Eigen::Index row = rows_[static_cast<std::size_t>(i)];
-      residual[i] = (here[row] - measured[row]) * weight_[i];
-    }
+    Eigen::VectorXd column = here - predictor_.measured();
+    weigh(predictor_.data(), weights_, column);
+    for (Eigen::Index i = 0; i < n; ++i) residual[i] = column[rows_[static_cast<std::size_t>(i)]];
     if (!residual.allFinite()) return false;
     if (jacobian == nullptr) return true;
     jacobian->resize(n, static_cast<Eigen::Index>(coordinates_.size()));
-    Eigen::VectorXd column;
     for (std::size_t j = 0; j < coordinates_.size(); ++j) {
       const Coordinate& c = coordinates_[j];
       const auto k = static_cast<Eigen::Index>(j);
-      column = here;
-      differentiate(predictor_, model, here, c, x[k] * c.scale, column);
-      for (Eigen::Index i = 0; i < n; ++i) {
-        const auto row = static_cast<std::size_t>(rows_[static_cast<std::size_t>(i)]);
-        const bool touched = (bit(predictor_.data().rows[row].chain) & c.chains) != 0;
-        const double slope = touched ? column[static_cast<Eigen::Index>(row)] * weight_[i] * c.scale : 0.0;
-        (*jacobian)(i, k) = std::isfinite(slope) ? slope : 0.0;
-      }
+      weighted_slope(predictor_, model, here, c, x[k] * c.scale, weights_, column);
+      for (Eigen::Index i = 0; i < n; ++i) (*jacobian)(i, k) = column[rows_[static_cast<std::size_t>(i)]];
     }
     return true;
   }
@@ -212,9 +212,9 @@ class Rows final : public ceres::CostFunction {
   const Predictor& predictor_;
   ModelPoint model_;
   std::vector<Coordinate> coordinates_;
+  const Weights& weights_;
   unsigned chains_;
   std::vector<Eigen::Index> rows_;
-  Eigen::VectorXd weight_;
 };
 
 /// The last steps within the bounds that are not touched; those that are stay held.
@@ -268,12 +268,12 @@ void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rou
   // The rows that were refitted; the others stay.
   Eigen::VectorXd prediction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(fit.model, fit.chains, prediction);
+  prediction -= predictor.measured();
+  weigh(predictor.data(), weights, prediction);
   if (fit.residual.size() == 0) fit.residual = Eigen::VectorXd::Zero(prediction.size());
   for (std::size_t i = 0; i < predictor.rows(); ++i) {
-    const Chain chain = predictor.data().rows[i].chain;
     const auto k = static_cast<Eigen::Index>(i);
-    if ((bit(chain) & fit.chains) != 0)
-      fit.residual[k] = (prediction[k] - predictor.measured()[k]) / weights.sigma[static_cast<int>(chain)];
+    if ((bit(predictor.data().rows[i].chain) & fit.chains) != 0) fit.residual[k] = prediction[k];
   }
   fit.loss = fit.residual.squaredNorm();
 }
@@ -358,20 +358,15 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
   predictor.predict(fit.model, kAllChains, here);
   Eigen::MatrixXd out(n, static_cast<Eigen::Index>(all.size()));
+  Eigen::VectorXd column;
   Eigen::Index columns = 0;
   for (const Coordinate& c : all) {
     const double value = fit.value(c), margin = 1e-3 * (c.upper - c.lower);
     if (c.base < 0 &&
         (value < c.lower + (c.tolerance ? margin : 0) || value > c.upper - (c.tolerance ? margin : 0)))
       continue;
-    Eigen::VectorXd column = here;
-    differentiate(predictor, fit.model, here, c, value, column);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Chain chain = predictor.data().rows[static_cast<std::size_t>(i)].chain;
-      out(i, columns) =
-          (bit(chain) & c.chains) != 0 ? column[i] * c.scale / weights.sigma[static_cast<int>(chain)] : 0.0;
-    }
-    ++columns;
+    weighted_slope(predictor, fit.model, here, c, value, weights, column);
+    out.col(columns++) = column;
     if (used != nullptr) used->push_back(c);
   }
   out.conservativeResize(n, columns);
@@ -391,8 +386,7 @@ Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen
     predictor.predict(with, effect.hypothesis->chains, change);
     change -= here;
   }
-  for (std::size_t i = 0; i < predictor.rows(); ++i)
-    change[static_cast<Eigen::Index>(i)] /= weights.sigma[static_cast<int>(predictor.data().rows[i].chain)];
+  weigh(predictor.data(), weights, change);
   return change;
 }
 

@@ -13,12 +13,9 @@
 #include <vector>
 
 #include "isac/explain/predict.hpp"
+#include "isac/explain/weights.hpp"
 
 namespace isac::explain {
-
-struct Weights {
-  double sigma[kChains] = {1, 1, 1, 1};  ///< of one low-passed row, N m or Pa
-};
 
 /// One fitted number of a model.
 struct Coordinate {

@@ -74,9 +74,10 @@ double size_over_floor(const Prepared& data, const Weights& weights, const Floor
                        const Eigen::VectorXd& difference, Chain* where) {
   double sum[kChains] = {}, best = 0;
   std::size_t rows[kChains] = {};
+  const Eigen::VectorXd plain = unfiltered(data, weights, difference);
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto c = static_cast<std::size_t>(data.rows[i].chain);
-    sum[c] += difference[static_cast<Eigen::Index>(i)] * difference[static_cast<Eigen::Index>(i)];
+    sum[c] += plain[static_cast<Eigen::Index>(i)] * plain[static_cast<Eigen::Index>(i)];
     ++rows[c];
   }
   for (int c = 0; c < kChains; ++c) {

@@ -71,7 +71,7 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
   if (id == "series_elasticity" && at == 1) return {5, 7, 10, 14, 20, 28, 40};
   if (id == "series_elasticity" && at == 2) return {0.05};
-  if (id == "backlash" && at == 0) return {0.003, 0.015};
+  if (one_of(id, {"backlash", "backlash_of_wheel"}) && at == 0) return {0.003, 0.015};
   if (id == "encoder_play" && at == 0) return {0.001, 0.004};
   if (id == "tension_loss" && at == 1) {
     const double far = std::max(r.angle_high, -r.angle_low);
@@ -96,7 +96,8 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   }
   if (id == "dead_time" && at == 0) return {0.006, 0.02};
   if (id == "second_order_lag" && at == 0) return {0.006, 0.03};
-  if (id == "sensor_lag" && at == 0) return {0.003, 0.015};
+  // A response at a long lag holds the curvature of the prediction's noise, which the residual holds too.
+  if (id == "sensor_lag" && at == 0) return {0.0005};
   if (id == "valve_deadband" && at == 0) return {0.01 * bar, 0.05 * bar};
   if (id == "valve_hysteresis" && at == 0) return {0.01 * bar, 0.05 * bar};
   if (id == "asymmetric_fill_vent" && at == 0) return {0.9, 1.15};
@@ -290,10 +291,11 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
     if (!seed) {
       // A sum of terms has no forces, pressures or motion of its own: torques on the output, and the angle's sensor.
       if (info.hook != Hook::kTorque && !touches(e, info).angle) continue;
-      if (one_of(id, {"pressure_creep", "offset", "inertia_error", "bearing_friction", "stiffness",
-                      "pressure", "backlash", "lever_arm_variation", "muscle_asymmetry",
-                      "pressure_dependent_stiffness", "quadratic_pressure_angle", "nonlinear_pressure_gain",
-                      "pressure_dependent_damping", "pressure_dependent_friction"}))
+      if (one_of(id,
+                 {"pressure_creep", "offset", "inertia_error", "bearing_friction", "stiffness", "pressure",
+                  "backlash", "backlash_of_wheel", "lever_arm_variation", "lever_arm_in_law",
+                  "muscle_asymmetry", "pressure_dependent_stiffness", "quadratic_pressure_angle",
+                  "nonlinear_pressure_gain", "pressure_dependent_damping", "pressure_dependent_friction"}))
         continue;
       if (id == "torque_offset" && in_baseline("offset")) continue;
       if (id == "encoder_offset" || id == "encoder_gain") continue;  // nothing says where the zero is
@@ -324,7 +326,7 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       if ((other.chains & there) != 0) library.hypotheses.push_back(other);
     };
     if (!seed) continue;
-    if (one_of(id, {"backlash", "end_stop"}))
+    if (one_of(id, {"backlash", "backlash_of_wheel", "end_stop"}))
       also([&](Hypothesis& o) {
         o.seen_by = SeenBy::kForceSensors, o.chains = bit(Chain::kTorque);
         if (id == "end_stop") o.shapes = stops(info, reach.angle_low, reach.angle_high);
@@ -336,22 +338,26 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       also([](Hypothesis& o) { o.clock = Clock::kDay; });
   }
 
-  const auto tolerate = [&](const char* id, double low, double high) {
-    Hypothesis h = make_hypothesis(models::find_effect(id), reach);
-    h.lower[0] = low;
-    h.upper[0] = high;
-    h.shapes.resize(1);
-    h.shapes[0][0] = 0.5 * high;
-    if ((h.chains & there) != 0) library.tolerances.push_back(h);
-  };
-  if (std::isfinite(data.rig.angle_step) && seed) {
-    tolerate("encoder_offset", -0.5 * data.rig.angle_step, 0.5 * data.rig.angle_step);
-  }
   if (seed) {
-    tolerate("time_skew", -0.5 * reach.interval, 0.5 * reach.interval);
-    tolerate("dead_time", -reach.interval, reach.interval);
+    tolerate(library, data, "time_skew", -0.5 * reach.interval, 0.5 * reach.interval);
+    tolerate(library, data, "dead_time", -reach.interval, 0);
   }
   return library;
+}
+
+void tolerate(Library& library, const Prepared& data, const std::string& id, double low, double high) {
+  Hypothesis h = make_hypothesis(models::find_effect(id), reach_of(data));
+  h.lower[0] = low;
+  h.upper[0] = high;
+  h.shapes.resize(1);
+  h.shapes[0][0] = 0.5 * (low + high);
+  if ((h.chains & chains_in(data)) == 0) return;
+  for (Hypothesis& known : library.tolerances)
+    if (known.effect == h.effect) {
+      known = std::move(h);
+      return;
+    }
+  library.tolerances.push_back(std::move(h));
 }
 
 void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual) {

@@ -6,7 +6,7 @@
 /// clock its time is (of the run or of the day). Several readings of one effect share its id; the best one speaks for it.
 /// A shape is a set of values for the parameters that are not amplitudes (width, time constant, onset), at which the response
 /// to an amplitude is computed; the grids follow what the data reaches. Tolerances are effects that every rig has in small:
-/// half a step of the encoder's zero, half a sample of skew, a sample of the valve's clock; they are bounded and never named.
+/// half a sample of skew, a valve's clock that runs a sample ahead; they are bounded and never named.
 /// Units: SI. Threads: values. Errors: none. Source: docs/effects.md, docs/derivations/explain.md.
 #pragma once
 
@@ -73,6 +73,9 @@ struct Library {
 
 /// All of the catalogue that the data can speak of, without `excluded` ids (and without what is the baseline's own).
 [[nodiscard]] Library make_library(const Prepared& data, const std::vector<std::string>& excluded = {});
+
+/// Makes an effect a tolerance within bounds, or gives one that is there other bounds.
+void tolerate(Library& library, const Prepared& data, const std::string& id, double low, double high);
 
 /// Adds to the encoder's slip the moment within a run at which the torque's residual jumps most and stays.
 void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual);

@@ -24,6 +24,8 @@ Predictor::Predictor(const Prepared& data) : data_(&data) {
     terms_.push_back(e);
     term_sign_.push_back(data.baseline.driven && !info.added_to_output ? -1.0 : 1.0);
     if (std::string_view(info.id) == "stiffness") stiffness_ = static_cast<int>(base_.size());
+    if (std::string_view(info.id) == "cubic_damping") cubic_damping_ = static_cast<int>(base_.size());
+    if (std::string_view(info.id) == "viscous_damping") damping_ = static_cast<int>(base_.size());
     if (std::string_view(info.id) == "pressure") pressure_gain_ = static_cast<int>(base_.size());
     base_.push_back({.name = seed ? name : p.name,
                      .unit = p.unit,

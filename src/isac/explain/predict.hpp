@@ -85,7 +85,7 @@ class Predictor {
   std::vector<int> terms_;         ///< catalogue indices of the output's terms
   std::vector<double> term_sign_;  ///< −1 for a driven axis
   int gain_ = -1, lag_ = -1;       ///< positions of K_C, T_C in base
-  int stiffness_ = -1, pressure_gain_ = -1;
+  int stiffness_ = -1, pressure_gain_ = -1, cubic_damping_ = -1, damping_ = -1;
   Eigen::VectorXd measured_;
   std::vector<std::size_t> resting_;
 };

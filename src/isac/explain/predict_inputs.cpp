@@ -239,7 +239,7 @@ void Predictor::add_columns(std::size_t index, Inputs& in) const {
   in.columns.clear();
   for (std::size_t i = data_->run_begin[index]; i < data_->run_begin[index + 1]; ++i) {
     if (data_->rows[i].chain != Chain::kTorque) continue;
-    const JointPoint<double> x = point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration,
+    const JointPoint<double> x = point_at(data_->rig, {}, *in.angle, *in.velocity, *in.acceleration,
                                           in.pressure, 0, data_->rows[i].sample);
     for (std::size_t j = 0; j < terms_.size(); ++j)
       in.columns.push_back(term_sign_[j] * models::effect_torque(terms_[j], &one, x));

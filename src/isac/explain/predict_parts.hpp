@@ -24,10 +24,17 @@ namespace isac::explain {
   return std::abs(s) < 0.03 ? 1 + s * (0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120))) : std::expm1(s) / s;
 }
 
-[[nodiscard]] inline models::JointPoint<double> point_at(
-    const RigFacts& rig, double stiffness, double pressure_gain, const std::vector<double>& angle,
-    const std::vector<double>& velocity, const std::vector<double>& acceleration,
-    const std::vector<double>* const (&pressure)[2], double time, std::size_t k) {
+/// Of the baseline, what effects that bend it need: A, B, C, D.
+struct BaselineOfPoint {
+  double stiffness = 0, pressure_gain = 0, cubic_damping = 0, damping = 0;
+};
+
+[[nodiscard]] inline models::JointPoint<double> point_at(const RigFacts& rig, const BaselineOfPoint& base,
+                                                         const std::vector<double>& angle,
+                                                         const std::vector<double>& velocity,
+                                                         const std::vector<double>& acceleration,
+                                                         const std::vector<double>* const (&pressure)[2],
+                                                         double time, std::size_t k) {
   models::JointPoint<double> x;
   x.angle = angle[k];
   x.velocity = velocity[k];
@@ -40,8 +47,10 @@ namespace isac::explain {
   x.time = time;
   x.wheel_radius = std::isfinite(rig.wheel_radius) ? rig.wheel_radius : 1.0;
   x.reference_pressure = rig.initial_pressure;
-  x.stiffness = stiffness;
-  x.pressure_gain = pressure_gain;
+  x.stiffness = base.stiffness;
+  x.pressure_gain = base.pressure_gain;
+  x.cubic_damping = base.cubic_damping;
+  x.damping = base.damping;
   return x;
 }
 

@@ -80,7 +80,8 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   };
   p[0].resize(n);
   p[1].resize(n);
-  double state[2] = {(*in.pressure[0])[0], (*in.pressure[1])[0]};
+  double state[2];  // what a sensor's model makes of its first reading, at the first reading's best value
+  for (int i = 0; i < 2; ++i) state[i] = run.first_pressure[i] + (*in.pressure[i])[0] - run.pressure[i][0];
   {
     const double u0[2] = {command(0, 0), command(1, 0)};
     double u[2] = {gain * u0[0], gain * u0[1]};

@@ -14,7 +14,10 @@ using models::JointPoint;
 /// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
 class Memory {
  public:
-  Memory(const Active& active) : active_(active), count_(active.hypothesis->info().state_count) {}
+  Memory(const Active& active)
+      : active_(active),
+        count_(active.hypothesis->info().state_count),
+        plays_(active.hypothesis->id() == "backlash") {}
   void rest(const JointPoint<double>& x) {
     models::effect_rest(active_.hypothesis->effect, active_.values.data(), x, z_);
   }
@@ -23,6 +26,10 @@ class Memory {
     JointPoint<double> middle = to;
     middle.angle = 0.5 * (from.angle + to.angle);
     middle.velocity = 0.5 * (from.velocity + to.velocity);
+    if (plays_) {  // a rate that is on or off would run past the play's end by up to a sample's motion
+      z_[0] = std::clamp(z_[0], to.angle - active_.values[0], to.angle + active_.values[0]);
+      return;
+    }
     if (count_ == 1) {
       // A state that slips at its limit must not run past it within a sample.
       const double first = rate(middle, z_[0]);
@@ -60,6 +67,7 @@ class Memory {
   }
   const Active& active_;
   int count_;
+  bool plays_;
   double z_[models::kMaxEffectStates] = {};
 };
 
@@ -67,7 +75,7 @@ class Memory {
 
 double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const {
   const JointPoint<double> x =
-      point_at(data_->rig, 0, 0, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
+      point_at(data_->rig, {}, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
   double torque = 0;
   for (std::size_t j = 0; j < terms_.size(); ++j)
     torque += term_sign_[j] * models::effect_torque(terms_[j], &model.base[j], x);
@@ -85,13 +93,16 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
     if (is_null(a)) continue;
     if (sum.empty()) sum.assign(run.time.size(), 0.0);
     const double sign = data_->baseline.driven ? -1.0 : 1.0;
-    const double stiffness = stiffness_ >= 0 ? model.base[static_cast<std::size_t>(stiffness_)] : 0.0;
-    const double gain = pressure_gain_ >= 0 ? model.base[static_cast<std::size_t>(pressure_gain_)] : 0.0;
+    const auto term = [&](int at) { return at >= 0 ? model.base[static_cast<std::size_t>(at)] : 0.0; };
+    const BaselineOfPoint base{.stiffness = term(stiffness_),
+                               .pressure_gain = term(pressure_gain_),
+                               .cubic_damping = term(cubic_damping_),
+                               .damping = term(damping_)};
     const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
     const std::vector<double>& acceleration = motion ? *in.slow_acceleration : *in.acceleration;
     const auto at = [&](std::size_t k) {
-      return point_at(data_->rig, stiffness, gain, *in.angle, velocity, acceleration, in.pressure,
-                      time_of(h, run, k), k);
+      return point_at(data_->rig, base, *in.angle, velocity, acceleration, in.pressure, time_of(h, run, k),
+                      k);
     };
     JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {

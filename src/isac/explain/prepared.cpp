@@ -64,6 +64,24 @@ const std::vector<double>* values_of(const series::Recording& run, const char* n
   return column == nullptr ? nullptr : &column->values;
 }
 
+/// Pressure at the start of a run. A valve that does not answer small errors keeps it for good, so the noise of one reading will not do:
+/// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is more than the readings' scatter.
+double first_pressure(const std::vector<double>& pressure, const std::vector<double>& command,
+                      double interval) {
+  constexpr double kLongest = 2.0, kShortest = 0.3, kLag = 0.17;  // s
+  std::size_t n = 0;
+  while (n < pressure.size() && n * interval < kLongest && command[n] == command[0]) ++n;
+  if (n * interval < kShortest) return pressure.front();
+  double s1 = 0, sg = 0, sgg = 0, sp = 0, sgp = 0, spp = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const double g = std::exp(-(static_cast<double>(k) * interval) / kLag), p = pressure[k] - pressure[0];
+    s1 += 1, sg += g, sgg += g * g, sp += p, sgp += g * p, spp += p * p;
+  }
+  const double det = s1 * sgg - sg * sg, c1 = (s1 * sgp - sg * sp) / det, c0 = (sp - c1 * sg) / s1;
+  const double scatter = std::sqrt(std::max(0.0, spp - c0 * sp - c1 * sgp) / s1);
+  return pressure[0] + (std::abs(c1) > 3 * scatter ? c0 + c1 : sp / s1);
+}
+
 PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
                         const BaselineModel& baseline, const Smoothing& smoothing) {
   PreparedRun run;
@@ -116,6 +134,8 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   run.command[0] = take("p1_cmd");
   run.command[1] = take("p2_cmd");
   run.has_command = run.has_pressure && !run.command[0].empty() && !run.command[1].empty();
+  for (int i = 0; i < 2 && run.has_command; ++i)
+    run.first_pressure[i] = first_pressure(run.raw_pressure[i], run.command[i], dt);
   const bool joint = baseline.terms.empty() || baseline.output == "torque";
   if (joint) {
     run.force[0] = take("F1");
@@ -261,10 +281,6 @@ std::vector<double> low_pass(std::span<const double> x, double sigma, std::size_
   return out;
 }
 
-namespace {
-
-/// A wide Gaussian as three running means, whose cost does not grow with its width; its variance is that of the Gaussian to a
-/// part in a hundred.
 std::vector<double> wide_low_pass(std::span<const double> x, double sigma) {
   const auto n = static_cast<std::ptrdiff_t>(x.size());
   const auto half = std::max<std::ptrdiff_t>(1, std::lround((std::sqrt(4 * sigma * sigma + 1) - 1) / 2));
@@ -283,8 +299,6 @@ std::vector<double> wide_low_pass(std::span<const double> x, double sigma) {
   }
   return now;
 }
-
-}  // namespace
 
 std::vector<double> quieten(std::span<const double> raw, std::span<const double> narrow, double sigma,
                             double wide_sigma, double white) {
@@ -328,11 +342,19 @@ std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<co
                                  double interval, double angle_step) {
   const std::vector<double> wide = low_pass_derivative(raw_angle, kWideKernel / interval, interval, 1);
   const double still = std::isfinite(angle_step) && angle_step > 0 ? angle_step / kSlowestStep : 0.0;
+  // A wide kernel sees a turn that is not even on both sides too early or too late, by σ²/2 times its bend: where the joint turns quickly,
+  // the kernel's own second smoothing tells how much. (Where it creeps, that would double the noise.)
+  const std::vector<double> wider = low_pass(wide, kWideKernel / interval);
+  const auto reach = static_cast<std::size_t>(std::max(1.0, 0.5 * kWideKernel / interval));
   std::vector<double> out(velocity.size());
   for (std::size_t k = 0; k < out.size(); ++k) {
+    const std::size_t a = k - std::min(k, reach), b = std::min(out.size() - 1, k + reach);
+    const double change = std::abs(wide[b] - wide[a]) * kWideKernel / (static_cast<double>(b - a) * interval);
+    const double quick = still > 0 ? std::clamp(change / still - 1, 0.0, 1.0) : 1.0;
+    const double slow = wide[k] + quick * (wide[k] - wider[k]);
     const double share =
         still > 0 ? std::clamp((std::abs(wide[k]) - 2 * still) / (4 * still), 0.0, 1.0) : 1.0;
-    const double w = share * velocity[k] + (1 - share) * wide[k];
+    const double w = share * velocity[k] + (1 - share) * slow;
     out[k] = std::abs(w) > still ? w : 0.0;
   }
   return out;

@@ -57,10 +57,11 @@ struct PreparedRun {
   std::vector<double> smooth_pressure[2];  ///< Pa, low-passed: what the valve unit's model is held against
   /// Pa, what enters the torque: low-passed more where the pressure rests, so that its noise does not pass for torque.
   std::vector<double> pressure[2];
-  std::vector<double> command[2];                      ///< Pa as recorded
-  std::vector<double> force[2];                        ///< N as read; empty where only the torque is known
-  std::vector<double> torque;                          ///< N m (or the output's unit) as read
-  std::vector<double> smooth_torque;                   ///< low-passed for the torque chain
+  double first_pressure[2] = {0, 0};  ///< Pa, where each began, from as long as its command stood still
+  std::vector<double> command[2];     ///< Pa as recorded
+  std::vector<double> force[2];       ///< N as read; empty where only the torque is known
+  std::vector<double> torque;         ///< N m (or the output's unit) as read
+  std::vector<double> smooth_torque;  ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
   std::vector<unsigned char> loaded;  ///< 0 where a force sensor hangs slack: it cannot read a push
   std::vector<unsigned char> usable;  ///< 0 beside gaps and edges
@@ -125,6 +126,9 @@ void cut_blocks(Prepared& data, double block_seconds);
 /// g ∗ x at the samples asked for (every `stride`-th from `first`); the ends are continued by their last value.
 [[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples,
                                            std::size_t first = 0, std::size_t stride = 1);
+/// The same for a wide Gaussian, as three running means, whose cost does not grow with its width; its variance is that of the
+/// Gaussian to a part in a hundred.
+[[nodiscard]] std::vector<double> wide_low_pass(std::span<const double> x, double sigma_samples);
 /// (g′ ∗ x)/Δt and (g″ ∗ x)/Δt².
 [[nodiscard]] std::vector<double> low_pass_derivative(std::span<const double> x, double sigma_samples,
                                                       double interval, int order);

@@ -92,7 +92,8 @@ Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain cha
     if (y.empty()) continue;
     for (std::size_t k = 0; k < y.size(); ++k) {
       if ((chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable)[k] == 0 ||
-          run.time[k] < kSkipStart || !std::isfinite(y[k]))
+          run.time[k] < kSkipStart || !std::isfinite(y[k]) ||
+          (chain == Chain::kMotion && run.dry_velocity[k] == 0))  // at rest any friction balances it
         continue;
       sums.squares += (measured[k] - y[k]) * (measured[k] - y[k]);
       sums.signal_squares += measured[k] * measured[k];
@@ -143,7 +144,7 @@ std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& be
   return traces;
 }
 
-Proof::Proof(const HeldOut& heldout, const Prepared& fitted) {
+Proof::Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure& quiet) {
   if (heldout.size() == 0) return;
   try {
     data_.emplace(prepare(heldout.runs_, fitted.rig, fitted.baseline, std::max(1.0, fitted.block_seconds),
@@ -151,6 +152,7 @@ Proof::Proof(const HeldOut& heldout, const Prepared& fitted) {
   } catch (const Error&) {
     return;  // nothing in them can be compared
   }
+  quiet.apply(*data_);
   predictor_.emplace(*data_);
   for (std::size_t r = 0; r + 1 < data_->run_begin.size(); ++r)
     count_ += data_->run_begin[r] < data_->run_begin[r + 1] ? 1U : 0U;

@@ -13,6 +13,7 @@
 
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/fit.hpp"
+#include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/spectrum.hpp"
 
 namespace isac::explain {
@@ -36,7 +37,7 @@ struct Sums {
 class Proof {
  public:
   /// Held-out runs prepared with the rig and baseline of the fitted ones; empty if none can be used.
-  Proof(const HeldOut& heldout, const Prepared& fitted);
+  Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure& quiet = {});
   [[nodiscard]] std::size_t runs() const noexcept { return count_; }
   [[nodiscard]] Sums residual(const ModelPoint& model, Chain chain) const;
   /// measured − predicted of each run, for what shows at the recording's rate only.

@@ -8,9 +8,9 @@
 namespace isac::explain {
 namespace {
 
-// Sigma that a general case must lead a simpler one by to stand first, and to stand beside it: chance alone passes the first in
-// two of a hundred.
-constexpr double kNestedLimit = 0.75, kNestedDoubt = 0.2;
+// Sigma that a general case must lead a simpler one by to stand first, and to stand beside it. If the general one is true and s sigma of
+// data lie between the two, it leads by s/2: with less than three they are twins.
+constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 
 }  // namespace
 
@@ -23,6 +23,8 @@ std::string Ranking::id_of(const Trial& t) const {
 
 bool Ranking::is_limit_case(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  // Friction that is less at rest than in motion is no Stribeck friction: it mends how a turn was seen.
+  if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] <= t.values[0]) return true;
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const auto& parameter = h.info().parameters[i];
@@ -37,15 +39,18 @@ bool Ranking::is_limit_case(const Trial& t) const {
   return false;
 }
 
-void Ranking::rank(std::vector<Trial>& trials, double unit) const {
+void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const {
   if (trials.empty()) return;
+  const auto least = std::min_element(trials.begin(), trials.end(),
+                                      [](const Trial& a, const Trial& b) { return a.loss < b.loss; });
+  const double unit = compare(data_, least->residual, before, 0, noise_density(data_, least->residual)).unit;
   const auto penalised = [&](const Trial& t) { return t.loss + 2 * unit * parameters_of(t); };
   std::stable_sort(trials.begin(), trials.end(),
                    [&](const Trial& a, const Trial& b) { return penalised(a) < penalised(b); });
   // The best reading of an effect speaks for it.
   std::set<std::string> seen;
   std::erase_if(trials, [&](const Trial& t) { return !seen.insert(id_of(t)).second; });
-  mark(trials, unit);
+  mark(trials);
   // Parsimony: a simpler case that is not ruled out stands for the general one.
   std::size_t changes = 0;  // two that each stand for the other must not take turns for ever
   for (bool changed = true; changed && changes < trials.size();) {
@@ -58,7 +63,7 @@ void Ranking::rank(std::vector<Trial>& trials, double unit) const {
       if (!simpler && !fewer) continue;
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      mark(trials, unit);
+      mark(trials);
       changed = true;
       ++changes;
       break;
@@ -73,10 +78,11 @@ void Ranking::rank(std::vector<Trial>& trials, double unit) const {
   weigh(trials);
 }
 
-void Ranking::mark(std::vector<Trial>& trials, double unit) const {
+void Ranking::mark(std::vector<Trial>& trials) const {
   const Trial& best = trials.front();
+  const NoiseDensity noise = noise_density(data_, best.residual);
   for (Trial& t : trials) {
-    t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), unit);
+    t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), noise);
     t.in_set = &t == &best || cannot_rule_out(t.behind);
   }
 }

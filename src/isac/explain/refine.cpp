@@ -101,9 +101,10 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
   if (refined.residual.size() == 0 || !refined.residual.allFinite())
     refined.residual = place.residual;  // breaks down there
   refined.loss = refined.residual.squaredNorm();
-  const bool staircase =
-      hypothesis.info().state_count > 0 && (hypothesis.dry || hypothesis.reads_angle ||
-                                            std::string_view(hypothesis.info().id) == "valve_hysteresis");
+  const std::string_view id = hypothesis.info().id;
+  const bool staircase = (hypothesis.info().state_count > 0 &&
+                          (hypothesis.dry || hypothesis.reads_angle || id == "valve_hysteresis")) ||
+                         id == "valve_stiction";
   if (staircase) {
     // Events make the loss a staircase on which derivatives mislead: one parameter after another, ever finer.
     for (const double change : {0.3, 0.1, 0.03, 0.01}) {

@@ -224,6 +224,10 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       column.atom_norm[b] += x[i] * x[i];
       column.chain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] += x[i] * x[i];
     }
+    const Eigen::VectorXd plain = unfiltered(data, *place.weights, x);
+    for (Eigen::Index i = 0; i < n; ++i)
+      column.plain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] +=
+          plain[i] * plain[i];
     column.norm2 = column.atom_norm.sum();
     // A third of a percent of a response is how its column was low-passed, not what the effect does.
     if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
@@ -262,6 +266,7 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
         c.name = generic.name(d);
         c.chain = generic.chain(d);
         Eigen::VectorXd rows = generic.rows(d);
+        weigh(data, *place.weights, rows);
         summarise(rows, c);
         done[t].columns.push_back(std::move(c));
         continue;
@@ -303,14 +308,14 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       s.shape = tasks[t].shape;
       s.gain = linear.gain;
       double all = 0;
-      for (int c = 0; c < kChains; ++c) {
-        for (std::size_t a = 0; a < ways.size(); ++a) {
-          const double amplitude = linear.amplitude[static_cast<Eigen::Index>(a)];
-          s.chain_share[c] += amplitude * amplitude * result.columns[a].chain_norm2[c];
-        }
-        all += s.chain_share[c];
+      for (std::size_t a = 0; a < ways.size(); ++a) {
+        const double amplitude = linear.amplitude[static_cast<Eigen::Index>(a)];
+        all += amplitude * amplitude * result.columns[a].norm2;
+        for (int c = 0; c < kChains; ++c)
+          s.chain_norm2[c] += amplitude * amplitude * result.columns[a].plain_norm2[c];
       }
-      for (double& share : s.chain_share) share = all > 0 ? share / all : 0;
+      // Parts that lie against one another are less together than each by itself.
+      for (double& norm2 : s.chain_norm2) norm2 *= all > 0 ? linear.gain / all : 0.0;
       s.start = null_values(h, shape);
       for (std::size_t a = 0; a < ways.size(); ++a) {
         s.reach = std::max(s.reach, std::sqrt(result.columns[a].norm2));

@@ -32,6 +32,7 @@ struct Column {
   double score = 0, norm2 = 0;            ///< Σ g_b, Σ x⊥²
   double raw_norm2 = 0;                   ///< Σ x²: what was there before the projection
   double chain_norm2[kChains] = {};       ///< Σ x⊥² of each chain
+  double plain_norm2[kChains] = {};       ///< the same of x⊥/σ as it is in time, before the noise's filter
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
@@ -44,7 +45,7 @@ struct Screened {
   double gain = 0;    ///< drop of the loss by that linear fit, within the signs that the effect allows
   double T = 0;       ///< largest of its columns
   double rare_z = 0;  ///< largest of its columns' scores against the scatter of blocks elsewhere
-  double chain_share[kChains] = {};  ///< of its response's squares, by chain
+  double chain_norm2[kChains] = {};  ///< Σ of its response's squares as they are in time, by chain
   double reach =
       0;  ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
 };
@@ -101,5 +102,8 @@ class Dictionary {
   std::shared_ptr<const Signals> signals_;
   std::vector<Chain> chains_;
 };
+
+/// A weighted residual without what the generic functions can make of it, chain by chain: mostly noise, whatever is missing.
+[[nodiscard]] Eigen::VectorXd beside_generic_functions(const Prepared& data, const Eigen::VectorXd& residual);
 
 }  // namespace isac::explain

@@ -18,6 +18,8 @@ constexpr std::size_t kShortlist = 9;
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
+constexpr double kConvention = 0.12;     // relative
+constexpr double kKeptPromise = 0.1;     // of the linear gain
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
@@ -37,6 +39,7 @@ class Search {
     say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
     place_slip(library_, data_, found_.baseline.residual);
     move_to(found_.baseline);
+    take_colour();
     forward();
     if (found_.added.size() > 1) swap_and_drop();
     return std::move(found_);
@@ -82,6 +85,21 @@ class Search {
     place_ = around(predictor_, found_.model, found_.weights);
   }
 
+  /// Everything is fitted anew beside the noise's slow part.
+  void take_colour() {
+    const Eigen::VectorXd left = beside_generic_functions(data_, place_.residual);
+    for (int c = 0; c < kChains; ++c)
+      if (rows_[c] > 0) found_.weights.colour[c] = colour_of(data_, left, static_cast<Chain>(c));
+    // The same force sensors speak in both.
+    const double ratio = found_.weights.sigma[0] / found_.weights.sigma[3];
+    if (rows_[0] > 0 && rows_[3] > 0)
+      found_.weights.colour[3].wander =
+          std::max(found_.weights.colour[3].wander, ratio * ratio * found_.weights.colour[0].wander);
+    found_.weights.take(data_);
+    found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+    move_to(found_.baseline);
+  }
+
   /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
   /// candidate leaves over.
   Screen screen_here() {
@@ -107,10 +125,10 @@ class Search {
     Gate gate;
     gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
     gate.significant = gate.p_value <= options_.significance;
-    const auto consider = [&](double gain, const double* share, const std::string& what, bool dense) {
+    const auto consider = [&](double amplitude2, const double* norm2, const std::string& what, bool dense) {
       for (int c = 0; c < kChains; ++c) {
-        if (rows_[c] == 0 || share[c] <= 0) continue;
-        const double size = std::sqrt(gain * share[c] / static_cast<double>(rows_[c])) *
+        if (rows_[c] == 0 || norm2[c] <= 0) continue;
+        const double size = std::sqrt(amplitude2 * norm2[c] / static_cast<double>(rows_[c])) *
                             found_.weights.sigma[c] / floor_of(c);
         if (dense) gate.dense_size = std::max(gate.dense_size, size);
         if (size <= gate.size) continue;
@@ -123,13 +141,11 @@ class Search {
     for (const Screened& c : s.candidates)
       if (c.gain > 0 && significant(c, s) &&
           ignored.count(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()) == 0)
-        consider(c.gain, c.chain_share, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
+        consider(1.0, c.chain_norm2, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
                  !found_.added.empty() && c.T >= s.limit);
     for (const Column& c : s.columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
-      double share[kChains] = {};
-      share[static_cast<int>(c.chain)] = 1;
-      consider(c.score * c.score / c.norm2, share, c.name, true);
+      consider(c.score * c.score / (c.norm2 * c.norm2), c.plain_norm2, c.name, true);
     }
     gate.material = gate.size >= options_.material;
     return gate;
@@ -169,9 +185,14 @@ class Search {
     for (std::size_t i = 0; i < found_.model.tolerances; ++i) {
       const Active& a = found_.model.model.effects[i];
       const double margin = 0.01 * (a.hypothesis->upper[0] - a.hypothesis->lower[0]);
+      if (std::abs(a.values[0]) < margin) continue;  // absent
       if (a.values[0] < a.hypothesis->lower[0] + margin || a.values[0] > a.hypothesis->upper[0] - margin)
         return true;
     }
+    for (const std::size_t run : predictor_.resting_runs())
+      if (run < found_.model.model.rest.size() &&
+          std::abs(found_.model.model.rest[run]) > 0.98 * data_.rig.angle_step)
+        return true;
     return false;
   }
 
@@ -217,12 +238,16 @@ class Search {
     return trials;
   }
 
-  void report(const std::vector<Trial>& trials, double unit) {
+  void report(const std::vector<Trial>& trials) {
     for (const Trial& t : trials) {
       const Trial& best = trials.front();
       const std::string sentence =
-          &t == &best ? fmt::format("fits best; closes {:.0f} units of noise, {:.2f} of the floor",
-                                    (place_.residual.squaredNorm() - t.loss) / unit, t.material)
+          &t == &best
+              ? fmt::format(
+                    "fits best; closes {:.0f} units of noise, {:.2f} of the floor",
+                    (place_.residual.squaredNorm() - t.loss) /
+                        compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit,
+                    t.material)
           : t.in_set
               ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
                             ranking_.id_of(best), t.behind.t, t.behind.separation)
@@ -238,14 +263,14 @@ class Search {
     step.gate = gate_of(step.screen);
     if (!step.gate.significant || !step.gate.material) return step;
     step.trials = refit_all(shortlist(step.screen));
-    std::set<std::string> unphysical;
+    std::set<std::string> ignored;
     std::erase_if(step.trials, [&](const Trial& t) {
-      const bool wrong = is_unphysical(t);
-      if (wrong) unphysical.insert(ranking_.id_of(t));
+      const bool wrong = is_unphysical(t) || is_empty_promise(t, step.screen);
+      if (wrong) ignored.insert(ranking_.id_of(t));
       return wrong;
     });
-    if (!unphysical.empty()) step.gate = gate_of(step.screen, unphysical);
-    ranking_.rank(step.trials, step.screen.noise_unit);
+    if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
+    ranking_.rank(step.trials, place_.residual);
     // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
     const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
     step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
@@ -271,6 +296,13 @@ class Search {
     return false;
   }
 
+  /// A response at a finite size that no size of the effect keeps: it was the curvature of noise.
+  bool is_empty_promise(const Trial& t, const Screen& s) const {
+    for (const Screened& c : s.candidates)
+      if (c.hypothesis == t.hypothesis) return place_.residual.squaredNorm() - t.loss < kKeptPromise * c.gain;
+    return false;
+  }
+
   Active active_of(const Trial& t) const {
     Active a;
     a.hypothesis = &library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
@@ -292,8 +324,9 @@ class Search {
                : fmt::format("nothing {} is left: p = {:.2g}, {:.2f} of the noise floor",
                              step.gate.significant ? "material" : "significant", step.gate.p_value,
                              step.gate.size));
-      report(step.trials, step.screen.noise_unit);
+      report(step.trials);
       found_.adequate = !open;
+      if (open && found_.added.empty() && is_convention(step)) continue;
       if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
       bool take =
           open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
@@ -314,6 +347,32 @@ class Search {
     }
   }
 
+  /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
+  /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
+  bool is_convention(const Step& step) {
+    const auto near = [](double share, double convention) {
+      return std::abs(share - convention) < kConvention * convention;
+    };
+    for (const Trial& t : step.trials) {
+      if (!t.in_set) continue;
+      const std::string id = ranking_.id_of(t);
+      const double step_angle = data_.rig.angle_step, interval = data_.runs.front().interval;
+      if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5)) {
+        tolerate(library_, data_, id, -0.5 * step_angle, 0.5 * step_angle);
+      } else if (id == "dead_time" &&
+                 (near(t.values[0] / interval, 0.5) || near(t.values[0] / interval, 1))) {
+        tolerate(library_, data_, id, -interval, interval);
+      } else {
+        continue;
+      }
+      say(fmt::format("{} of {:.3g}: how the recorder counts, not an effect", id, t.values[0]));
+      found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+      move_to(found_.baseline);
+      return true;
+    }
+    return false;
+  }
+
   /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
   bool another_leaves_nothing() {
     std::vector<Trial>& trials = found_.steps.front().trials;
@@ -332,8 +391,7 @@ class Search {
       say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      const double unit = found_.steps.front().screen.noise_unit;
-      ranking_.mark(trials, unit);
+      ranking_.mark(trials);
       for (Trial& t : trials)
         if (ranking_.id_of(t) == first) t.in_set = false;
       Ranking::weigh(trials);

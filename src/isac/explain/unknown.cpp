@@ -54,6 +54,7 @@ void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
     double total = 0, count = 0;
   };
   std::vector<std::map<unsigned, Sum>> bins(kBins);  // by block
+  const Eigen::VectorXd residual = unfiltered(data, *place.weights, place.residual);
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const Row& row = data.rows[i];
     if (row.chain != chain) continue;
@@ -62,7 +63,7 @@ void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
     const auto bin =
         std::min<std::size_t>(kBins - 1, static_cast<std::size_t>((x - low) / (high - low) * kBins));
     Sum& s = bins[bin][row.block];
-    s.total -= place.residual[static_cast<Eigen::Index>(i)] * scale;  // measured − predicted
+    s.total -= residual[static_cast<Eigen::Index>(i)] * scale;  // measured − predicted
     s.count += 1;
   }
   for (int b = 0; b < kBins; ++b) {
@@ -109,7 +110,10 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
   std::vector<Entry> entries;
   for (const auto& [gain, column] : order) {
     if (entries.size() >= kTried) break;
-    if (generic.chain(column) == chain) entries.push_back({column, place.project(generic.rows(column))});
+    if (generic.chain(column) != chain) continue;
+    Eigen::VectorXd rows = generic.rows(column);
+    weigh(data, *place.weights, rows);
+    entries.push_back({column, place.project(rows)});
   }
   Eigen::VectorXd residual = -place.residual;
   double first = 0, taken = 0;

@@ -225,14 +225,16 @@ std::vector<Region> regions(const Predictor& predictor, const Library& library, 
   };
   std::vector<Part> parts;
   double all = 0;
+  const Eigen::VectorXd unexplained = unfiltered(data, found.weights, found.baseline.residual),
+                        left = unfiltered(data, found.weights, found.model.residual);
   for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
     const std::vector<std::size_t> rows = rows_of(data, chain);
     if (rows.empty()) continue;
     Part part{chain, 0, Eigen::VectorXd::Zero(n)};
-    const double quiet = explained ? 0.0 : quiet_level(data, found.baseline.residual, rows);
+    const double quiet = explained ? 0.0 : quiet_level(data, unexplained, rows);
     for (const std::size_t i : rows) {
       const auto k = static_cast<Eigen::Index>(i);
-      const double before = found.baseline.residual[k], after = found.model.residual[k];
+      const double before = unexplained[k], after = left[k];
       part.rows[k] = before * before - (explained ? after * after : quiet);
       part.weight += part.rows[k];
     }

@@ -76,6 +76,8 @@ struct JointPoint {
   S reference_pressure{};  ///< Pa, p0
   S stiffness{};           ///< N/m, A of the baseline; only effects that bend the baseline need it
   S pressure_gain{};       ///< N/Pa, B of the baseline; likewise
+  S cubic_damping{};       ///< N m s³, C of the baseline; likewise
+  S damping{};             ///< N m s, D of the baseline; likewise
 };
 
 /// The valve unit of one pair; index 0 is muscle 1, index 1 muscle 2.

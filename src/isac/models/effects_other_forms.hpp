@@ -199,7 +199,63 @@ struct SupplySag {
   }
 };
 
+/// The lever arm put into the seed's law as it stands, A r² φ with r(φ): without the travel that a longer lever winds up.
+struct LeverArmInLaw {
+  static constexpr EffectInfo kInfo{
+      .id = "lever_arm_in_law",
+      .term = "lever arm depends on the angle, travel does not",
+      .where = Subsystem::kMuscle,
+      .equation = "A r(phi)^2 phi + B r(phi) dp - A r^2 phi - B r dp, r(phi) = r (1 + a phi + b phi^2)",
+      .parameter_count = 2,
+      .parameters = {{"a", "1/rad", 1, -1, 1, 0.05}, {"b", "1/rad2", 1, -1, 1, -0.05}},
+      .state_count = 0,
+      .torque_term = true,
+      .linear = false,
+      .confused_with = "cubic_stiffness, quadratic_pressure_angle, encoder_gain",
+      .told_apart_by = "the pressure's part changes with the angle too",
+      .reported_as = "lever_arm_variation"};
+  template <class S>
+  static S torque(const S* q, const JointPoint<S>& x) noexcept {
+    const S more = x.angle * (q[0] + q[1] * x.angle), r = x.wheel_radius;
+    return x.pressure_gain * r * x.delta_pressure * more +
+           x.stiffness * r * r * x.angle * more * (S(2.0) + more);
+  }
+};
+
+/// The muscles' damping sits on the wheel too: while the joint crosses the play, the wheel stands and nothing is damped.
+struct BacklashOfWheel {
+  static constexpr EffectInfo kInfo{
+      .id = "backlash_of_wheel",
+      .term = "play between the wheel with all that the muscles do, and the joint",
+      .where = Subsystem::kJoint,
+      .equation = "A r^2 (z - phi) + (D phi' + C phi'^3 where z stands), z follows phi with play b",
+      .parameter_count = 1,
+      .parameters = {{"b", "rad", 1, 0, 0.2, 0.01}},
+      .state_count = 1,
+      .torque_term = true,
+      .linear = false,
+      .confused_with = "hysteresis, time_skew, encoder_play, coulomb_friction",
+      .told_apart_by = "scales with the stiffness; gone when one side stays loaded",
+      .reported_as = "backlash"};
+  template <class S>
+  static S torque(const S* q, const JointPoint<S>& x, const S* z) noexcept {
+    // What a step of a simulation leaves of the gap is not taken for crossing.
+    const S nearly = q[0] * S(0.95), gap = x.angle - z[0], w = x.velocity;
+    const bool follows = (gap >= nearly && w > S(0.0)) || (gap <= -nearly && w < S(0.0));
+    const S free = follows ? S(0.0) : w * (x.damping + x.cubic_damping * w * w);
+    return Backlash::torque(q, x, z) + (q[0] > S(0.0) ? free : S(0.0));
+  }
+  template <class S>
+  static void derivative(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    Backlash::derivative(q, x, z, dz);
+  }
+  template <class S>
+  static void rest(const S* q, const JointPoint<S>& x, S* z) noexcept {
+    Backlash::rest(q, x, z);
+  }
+};
+
 using OtherForms = EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction,
-                              PressureCreep, MaxwellSlip, SupplySag>;
+                              PressureCreep, MaxwellSlip, SupplySag, LeverArmInLaw, BacklashOfWheel>;
 
 }  // namespace isac::models::effect

@@ -78,7 +78,9 @@ models::JointPoint<double> JointPhysics::point_of(const StatePoint& point) const
           .wheel_radius = joint_.wheel_radius,
           .reference_pressure = joint_.initial_pressure,
           .stiffness = joint_.A,
-          .pressure_gain = joint_.B};
+          .pressure_gain = joint_.B,
+          .cubic_damping = joint_.C,
+          .damping = joint_.D};
 }
 
 Torques JointPhysics::torques(const StatePoint& point) const noexcept {

@@ -1,0 +1,234 @@
+#include "isac/explain/quiet_pressure.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/screen.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kMiddle = 0.15, kSlow = 1.0;  // s, kernels between the bands
+constexpr std::size_t kStride = 10;            // samples between the rows that G is fitted to
+constexpr double kPrior =
+    0.5;  // standard deviation of λ about 1 beforehand: where the torque cannot tell, the reading stands
+constexpr double kSettled = 0.4;  // s at a run's start in which p(0) is still felt
+constexpr int kFunctions = 29;
+using Functions = Eigen::Matrix<double, kFunctions, 1>;
+
+/// Least squares whose columns may nearly depend on each other.
+Eigen::VectorXd solve(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+  const Eigen::VectorXd norm = x.colwise().norm().cwiseMax(1e-12);
+  const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd gram = scaled.transpose() * scaled;
+  gram.diagonal().array() += 1e-6;
+  return norm.cwiseInverse().asDiagonal() * gram.ldlt().solve(scaled.transpose() * y);
+}
+
+/// What a valve's pressure may depend on by rule, at one sample; pressures in kg/cm².
+class Rules {
+ public:
+  Rules(const PreparedRun& run, const std::vector<double> (&predicted)[2], double lag, int valve)
+      : run_(run), own_(predicted[valve]), other_(predicted[1 - valve]), lag_(lag) {
+    const std::vector<double>& u = run.command[valve];
+    const double times[] = {0.3 * lag, 2.5 * lag, 1.0, 5.0};
+    for (int i = 0; i < 4; ++i) {
+      double p = u.front();
+      const double keep = std::exp(-run.interval / times[i]);
+      for (const double command : u) {
+        lagged_[i].push_back(p / kPascalPerKgfCm2);
+        p = command + keep * (p - command);
+      }
+    }
+  }
+  Functions at(std::size_t k) const {
+    const double bar = kPascalPerKgfCm2, q = own_[k] / bar, w = rate(own_, k), o = other_[k] / bar,
+                 v = rate(other_, k), day = 1e-3 * (run_.day_offset + run_.time[k]);
+    const bool moves = !run_.angle.empty();
+    const double angle = moves ? run_.angle[k] : 0, speed = moves ? run_.velocity[k] : 0;
+    Functions f;
+    f << 1, q, q * q, q * q * q, w, std::abs(w), w * std::abs(w), w * w * w, q * w, q * std::abs(w),
+        std::tanh(5 * w), lagged_[0][k], lagged_[1][k], lagged_[2][k], lagged_[3][k], o, v, std::abs(v),
+        o * q, std::max(0.0, q - 4), std::max(0.0, q + o - 7), angle, speed, std::abs(speed), angle * angle,
+        1e-2 * run_.time[k], day, day * q, day * w;
+    return f;
+  }
+
+ private:
+  double rate(const std::vector<double>& p, std::size_t k) const {  // of the lag, kg/cm² in its time
+    const std::size_t a = k == 0 ? 0 : k - 1, b = std::min(k + 1, p.size() - 1);
+    return (p[b] - p[a]) / (static_cast<double>(b - a) * run_.interval) * lag_ / kPascalPerKgfCm2;
+  }
+  const PreparedRun& run_;
+  const std::vector<double>&own_, &other_;
+  double lag_;
+  std::vector<double> lagged_[4];
+};
+
+}  // namespace
+
+struct QuietPressure::Parts {
+  std::vector<double> by_rule[2];       ///< p̂ + G, low-passed; empty where the run has no commands
+  std::vector<double> rest[2][kBands];  ///< r, by bands
+};
+
+std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data) const {
+  std::vector<Parts> all(data.runs.size());
+  const Predictor predictor(data);
+  ModelPoint model = model_;
+  model.base.resize(predictor.base().size());
+  const double lag = model_.base.back();
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    const PreparedRun& run = data.runs[r];
+    if (!run.has_command) continue;
+    const Predictor::FullRate rate = predictor.full_rate(model, r);
+    if (rate.pressure[0].empty()) continue;
+    const double sigma = data.smoothing.torque / run.interval;
+    for (int i = 0; i < 2; ++i) {
+      const Rules rules(run, rate.pressure, lag, i);
+      std::vector<double> ruled = rate.pressure[i], rest(ruled.size());
+      double mean = 0, settled = 0;
+      for (std::size_t k = 0; k < ruled.size(); ++k) {
+        ruled[k] += kPascalPerKgfCm2 * by_rule_[i].dot(rules.at(k));
+        rest[k] = run.raw_pressure[i][k] - ruled[k];
+        if (run.time[k] < 2 * kSettled || !std::isfinite(rest[k])) continue;
+        mean += rest[k];
+        settled += 1;
+      }
+      // Where a run stands at pressures that were not fitted, the functions may be off by a constant; its own mean says by how much.
+      mean /= std::max(1.0, settled);
+      for (std::size_t k = 0; k < ruled.size(); ++k) {
+        ruled[k] += mean;
+        rest[k] -= mean;
+        // The rough lag does not know where the run began.
+        const double known = std::clamp((run.time[k] / kSettled - 1) / 0.5, 0.0, 1.0);
+        ruled[k] += (1 - known) * rest[k];
+        rest[k] *= known;
+      }
+      const std::vector<double> narrow = low_pass(rest, sigma),
+                                middle = wide_low_pass(rest, kMiddle / run.interval),
+                                slow = wide_low_pass(rest, kSlow / run.interval);
+      all[r].by_rule[i] = low_pass(ruled, sigma);
+      for (auto& band : all[r].rest[i]) band.resize(rest.size());
+      for (std::size_t k = 0; k < rest.size(); ++k) {
+        all[r].rest[i][0][k] = narrow[k] - middle[k];
+        all[r].rest[i][1][k] = middle[k] - slow[k];
+        all[r].rest[i][2][k] = slow[k];
+      }
+    }
+  }
+  return all;
+}
+
+QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
+  QuietPressure quiet;
+  if (!data.baseline.terms.empty() || !data.has(Chain::kPressure1) || !data.has(Chain::kPressure2) ||
+      !data.has(Chain::kTorque))
+    return quiet;
+  double pressure_gain = 0;
+  {
+    const Predictor predictor(data);
+    Weights weights;
+    weights.sigma[1] = weights.sigma[2] = 150;  // Pa: the chains share nothing, so any scale will do
+    const Fit fit = fit_baseline(predictor, {}, weights);
+    quiet.model_ = known != nullptr ? *known : fit.model;
+    quiet.model_.rest.clear();
+    pressure_gain = fit.model.base[1];
+    const double lag = fit.model.base.back();
+    for (int i = 0; i < 2; ++i) {
+      std::vector<Functions> rows;
+      std::vector<double> off;
+      for (std::size_t r = 0; r < data.runs.size(); ++r) {
+        const PreparedRun& run = data.runs[r];
+        if (!run.has_command) continue;
+        const Predictor::FullRate rate = predictor.full_rate(quiet.model_, r);
+        const Rules rules(run, rate.pressure, lag, i);
+        for (std::size_t k = 0; k < run.time.size(); k += kStride)
+          if (run.usable[k] != 0 && run.time[k] > kSettled) {
+            rows.push_back(rules.at(k));
+            off.push_back((run.smooth_pressure[i][k] - rate.pressure[i][k]) / kPascalPerKgfCm2);
+          }
+      }
+      if (rows.size() < 20 * kFunctions) return quiet;
+      Eigen::MatrixXd x(static_cast<Eigen::Index>(rows.size()), kFunctions);
+      for (std::size_t n = 0; n < rows.size(); ++n) x.row(static_cast<Eigen::Index>(n)) = rows[n];
+      quiet.by_rule_[i] = solve(x, Eigen::Map<const Eigen::VectorXd>(off.data(), x.rows()));
+      if (!quiet.by_rule_[i].allFinite()) return quiet;
+    }
+  }
+  const std::vector<Parts> parts = quiet.parts_of(data);
+  const std::vector<PreparedRun> read = data.runs;  // should the torque tell nothing
+  quiet.known_ = true;
+  quiet.felt_ = {0, 0, 0};
+  quiet.apply(data);
+
+  // Torque = its base, generic functions of quiet signals, and the bands.
+  const Dictionary generic(data);
+  std::vector<Eigen::Index> at;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (data.rows[i].chain == Chain::kTorque && !parts[data.rows[i].run].by_rule[0].empty())
+      at.push_back(static_cast<Eigen::Index>(i));
+  const auto n = static_cast<Eigen::Index>(at.size());
+  std::vector<Eigen::VectorXd> columns;
+  for (std::size_t c = 0; c < generic.size(); ++c)
+    if (generic.chain(c) == Chain::kTorque) columns.push_back(generic.rows(c)(at));
+  Eigen::VectorXd y(n), cubed(n);
+  Eigen::MatrixXd bands(n, kBands);
+  const double gain = pressure_gain * data.rig.wheel_radius;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Row& row = data.rows[static_cast<std::size_t>(at[static_cast<std::size_t>(i)])];
+    const PreparedRun& run = data.runs[row.run];
+    y[i] = run.smooth_torque[row.sample];
+    cubed[i] = std::pow(run.velocity[row.sample], 3);
+    for (int b = 0; b < kBands; ++b)
+      bands(i, b) =
+          0.5 * gain * (parts[row.run].rest[1][b][row.sample] - parts[row.run].rest[0][b][row.sample]);
+  }
+  Eigen::MatrixXd x(n, static_cast<Eigen::Index>(columns.size()) + 1);
+  for (std::size_t c = 0; c < columns.size(); ++c) x.col(static_cast<Eigen::Index>(c)) = columns[c];
+  x.col(x.cols() - 1) = cubed;
+  const bool enough = n > 20 * (x.cols() + kBands);
+  if (enough) {
+    for (int b = 0; b < kBands; ++b) bands.col(b) -= x * solve(x, bands.col(b));
+    y -= x * solve(x, y);
+    const Eigen::VectorXd felt = solve(bands, y), left = y - bands * felt;
+    for (int b = 0; b < kBands; ++b) {
+      // Scatter of its score over blocks of time.
+      Eigen::VectorXd score = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.blocks));
+      for (Eigen::Index i = 0; i < n; ++i)
+        score[data.rows[static_cast<std::size_t>(at[static_cast<std::size_t>(i)])].block] +=
+            bands(i, b) * left[i];
+      const double norm2 = bands.col(b).squaredNorm(), error = score.norm() / std::max(norm2, 1e-300);
+      const double told = 1 / (error * error), before = 1 / (kPrior * kPrior);
+      quiet.felt_[static_cast<std::size_t>(b)] =
+          norm2 > 0 && std::isfinite(felt[b])
+              ? std::clamp((told * felt[b] + before) / (told + before), 0.0, 1.0)
+              : 1.0;
+    }
+  } else {
+    quiet.felt_ = {1, 1, 1};
+  }
+  data.runs = read;
+  quiet.apply(data);
+  return quiet;
+}
+
+void QuietPressure::apply(Prepared& data) const {
+  if (!known_) return;
+  const std::vector<Parts> parts = parts_of(data);
+  for (std::size_t r = 0; r < data.runs.size(); ++r)
+    for (int i = 0; i < 2; ++i) {
+      const Parts& part = parts[r];
+      if (part.by_rule[i].empty()) continue;
+      std::vector<double>& p = data.runs[r].pressure[i];
+      for (std::size_t k = 0; k < p.size(); ++k) {
+        p[k] = part.by_rule[i][k];
+        for (std::size_t b = 0; b < kBands; ++b) p[k] += felt_[b] * part.rest[i][b][k];
+      }
+    }
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,230 @@
+#include "isac/explain/weights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "isac/core/units.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kKernelForgets =
+    4.3;  // standard deviations of the kernel: beyond, white noise has left 1 % of correlation
+constexpr double kLongestLag = 1.2;                 // s
+constexpr double kShortest = 0.03, kLongest = 3.0;  // s, of the memory
+constexpr int kMemories = 24;
+constexpr double kFastest = 4.0;                     // Hz
+constexpr double kWanders = 100.0;                   // s, memory of a zero that wanders
+constexpr double kWanderLags[3] = {2.0, 14.0, 4.0};  // s: from, to, and over how many of them
+constexpr double kByChance = 3;                      // standard errors
+
+bool is_slow(const Colour& c) {
+  return (c.slow > 0 && c.memory > 0) || c.wander > 0;
+}
+
+}  // namespace
+
+/// Decays, gains and scales of the noise's Kalman filter, row by row: they do not depend on what is filtered.
+struct NoiseFilter {
+  struct Gains {
+    double stay1 = 0, stay2 = 0, gain1 = 0, gain2 = 0, scale = 1;
+  };
+  const Prepared* data = nullptr;
+  std::size_t rows = 0;
+  std::vector<Gains> gains;
+
+  NoiseFilter(const Prepared& of, const Colour (&colours)[kChains])
+      : data(&of), rows(of.rows.size()), gains(rows) {
+    const Row* last = nullptr;
+    double p11 = 0, p12 = 0, p22 = 0;
+    double stay1 = 0, stay2 = 0;
+    unsigned step = 0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const Row& row = of.rows[i];
+      const Colour& c = colours[static_cast<int>(row.chain)];
+      if (!is_slow(c)) {
+        last = nullptr;
+        continue;
+      }
+      Gains& g = gains[i];
+      if (last == nullptr || last->run != row.run || last->chain != row.chain || row.sample <= last->sample) {
+        p11 = c.slow, p12 = 0, p22 = c.wander;
+        step = 0;
+      } else {
+        if (row.sample - last->sample != step) {
+          step = row.sample - last->sample;
+          const double dt = step * of.runs[row.run].interval;
+          stay1 = c.memory > 0 ? std::exp(-dt / c.memory) : 0;
+          stay2 = std::exp(-dt / kWanders);
+        }
+        g.stay1 = stay1, g.stay2 = stay2;
+        p11 = stay1 * stay1 * p11 + c.slow * (1 - stay1 * stay1);
+        p12 *= stay1 * stay2;
+        p22 = stay2 * stay2 * p22 + c.wander * (1 - stay2 * stay2);
+      }
+      const double to1 = p11 + p12, to2 = p12 + p22, spread = to1 + to2 + c.white;
+      g.gain1 = to1 / spread, g.gain2 = to2 / spread;
+      g.scale = std::sqrt(c.white / spread);
+      p11 -= g.gain1 * to1, p12 -= g.gain1 * to2, p22 -= g.gain2 * to2;
+      last = &row;
+    }
+  }
+};
+
+void Weights::take(const Prepared& data) {
+  filter = std::any_of(std::begin(colour), std::end(colour), is_slow)
+               ? std::make_shared<const NoiseFilter>(data, colour)
+               : nullptr;
+}
+
+namespace {
+
+std::shared_ptr<const NoiseFilter> filter_of(const Prepared& data, const Weights& weights) {
+  if (weights.filter && weights.filter->data == &data && weights.filter->rows == data.rows.size())
+    return weights.filter;
+  return std::any_of(std::begin(weights.colour), std::end(weights.colour), is_slow)
+             ? std::make_shared<const NoiseFilter>(data, weights.colour)
+             : nullptr;
+}
+
+}  // namespace
+
+void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::VectorXd> rows) {
+  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
+  double m1 = 0, m2 = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    double& y = rows[static_cast<Eigen::Index>(i)];
+    y /= weights.sigma[static_cast<int>(data.rows[i].chain)];
+    if (!filter) continue;
+    const NoiseFilter::Gains& g = filter->gains[i];
+    m1 *= g.stay1;
+    m2 *= g.stay2;
+    const double innovation = y - m1 - m2;
+    m1 += g.gain1 * innovation;
+    m2 += g.gain2 * innovation;
+    y = g.scale * innovation;
+  }
+}
+
+Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights, const Eigen::VectorXd& weighted) {
+  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
+  if (!filter) return weighted;
+  Eigen::VectorXd rows = weighted;
+  double m1 = 0, m2 = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    double& e = rows[static_cast<Eigen::Index>(i)];
+    const NoiseFilter::Gains& g = filter->gains[i];
+    m1 *= g.stay1;
+    m2 *= g.stay2;
+    const double innovation = e / g.scale, before = m1 + m2;
+    m1 += g.gain1 * innovation;
+    m2 += g.gain2 * innovation;
+    e = before + innovation;
+  }
+  return rows;
+}
+
+Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain) {
+  // Pieces without gaps.
+  std::vector<std::vector<double>> pieces;
+  double spacing = 0;
+  unsigned step = 0;
+  const Row* last = nullptr;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const Row& row = data.rows[i];
+    if (row.chain != chain) continue;
+    const bool same = last != nullptr && last->run == row.run && row.sample > last->sample;
+    if (same && step == 0) step = row.sample - last->sample;
+    if (!same || row.sample - last->sample != step) pieces.emplace_back();
+    pieces.back().push_back(residual[static_cast<Eigen::Index>(i)]);
+    if (spacing == 0 && same) spacing = step * data.runs[row.run].interval;
+    last = &row;
+  }
+  Colour none;
+  if (!(spacing > 0)) return none;
+  const auto lags = static_cast<std::size_t>(kLongestLag / spacing);
+  std::vector<double> covariance(lags + 1, 0.0), count(lags + 1, 0.0);
+  for (const std::vector<double>& x : pieces)
+    for (std::size_t lag = 0; lag <= lags && lag < x.size(); ++lag) {
+      double sum = 0;
+      for (std::size_t k = lag; k < x.size(); ++k) sum += x[k] * x[k - lag];
+      covariance[lag] += sum;
+      count[lag] += static_cast<double>(x.size() - lag);
+    }
+  for (std::size_t lag = 0; lag <= lags; ++lag)
+    if (count[lag] > 0) covariance[lag] /= count[lag];
+  const double kernel = chain == Chain::kMotion ? data.smoothing.motion : data.smoothing.torque;
+  const auto first = static_cast<std::size_t>(std::ceil(kKernelForgets * kernel / spacing));
+  if (first + 8 > lags || !(covariance[0] > 0)) return none;
+
+  Colour best;
+  // A zero that wanders: how much more two rows differ that lie 14 to 18 s apart within a run than two that lie 2 to 6 s apart (a constant
+  // of a run may be an effect), where that is more than the fast noise makes by chance.
+  double fall = 0, weight = 0, fast = 0;
+  double level = 0;  // what lasts beyond the fast noise
+  for (std::size_t lag = lags / 2; lag <= lags; ++lag)
+    level += covariance[lag] / static_cast<double>(lags - lags / 2 + 1);
+  for (std::size_t lag = 0; lag <= lags; ++lag)
+    fast += (lag == 0 ? 1 : 2) * (covariance[lag] - level) * (covariance[lag] - level);
+  for (const std::vector<double>& x : pieces) {
+    double near = 0, far = 0, steps = 0;
+    for (double s = 0; s < kWanderLags[2]; s += 0.5) {
+      const auto to = static_cast<std::size_t>((kWanderLags[1] + s) / spacing),
+                 from = static_cast<std::size_t>((kWanderLags[0] + s) / spacing);
+      if (x.size() < to + to / 2) break;
+      double at_near = 0, at_far = 0;
+      for (std::size_t k = to; k < x.size(); ++k) {
+        at_near -= 0.5 * (x[k] - x[k - from]) * (x[k] - x[k - from]);
+        at_far -= 0.5 * (x[k] - x[k - to]) * (x[k] - x[k - to]);
+      }
+      near += at_near / static_cast<double>(x.size() - to);
+      far += at_far / static_cast<double>(x.size() - to);
+      ++steps;
+    }
+    if (steps == 0) continue;
+    fall += static_cast<double>(x.size()) * (near - far) / steps;
+    weight += static_cast<double>(x.size());
+  }
+  if (weight > 0) {
+    fall /= weight;
+    const double chance = std::sqrt(2 * fast / weight),
+                 share = std::exp(-(kWanderLags[0] + 0.5 * kWanderLags[2]) / kWanders) -
+                         std::exp(-(kWanderLags[1] + 0.5 * kWanderLags[2]) / kWanders);
+    if (fall > kByChance * chance) best.wander = fall / share;
+  }
+  const double wander = std::min(best.wander, covariance[std::min(lags, first * 4)]);
+  double least = std::numeric_limits<double>::infinity();
+  for (int m = 0; m < kMemories; ++m) {
+    const double memory = kShortest * std::pow(kLongest / kShortest, m / (kMemories - 1.0));
+    double product = 0, squares = 0, misfit = 0;
+    for (std::size_t lag = first; lag <= lags; ++lag) {
+      const double shape = std::exp(-static_cast<double>(lag) * spacing / memory);
+      product += count[lag] * (covariance[lag] - wander) * shape;
+      squares += count[lag] * shape * shape;
+    }
+    const double slow = std::clamp(product / squares, 0.0, covariance[0]);
+    for (std::size_t lag = first; lag <= lags; ++lag) {
+      const double off =
+          covariance[lag] - wander - slow * std::exp(-static_cast<double>(lag) * spacing / memory);
+      misfit += count[lag] * off * off;
+    }
+    if (misfit >= least) continue;
+    least = misfit;
+    best = {1, slow, memory, best.wander};
+  }
+  // What is left within the kernel's reach: its sum is the density at low frequencies. Noise of a derivative has little there and
+  // much beyond; the variance of one row bounds it.
+  double density = 0;
+  for (std::size_t lag = 0; lag < first; ++lag)
+    density += (lag == 0 ? 1 : 2) * (covariance[lag] - wander -
+                                     best.slow * std::exp(-static_cast<double>(lag) * spacing / best.memory));
+  best.white = std::max({density, covariance[0] - wander - best.slow, 0.1 * covariance[0]});
+  // Faster than this a model of jumps is no better than the encoder tells when they happen: no weight is gained there.
+  const double turns = 2 * kPi * kFastest * best.memory;
+  best.white = std::max(best.white, 2 * best.slow * best.memory / (spacing * (1 + turns * turns)));
+  return best;
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,183 @@
+// What the noise is taken for: its colour, its wandering zero, and how much of a pressure's reading is pressure.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/quiet_pressure.hpp"
+#include "isac/explain/weights.hpp"
+#include "tied_data.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kStep = 0.008;  // s between rows
+
+/// Rows of one chain in runs of one length, a gap of so many rows in the middle of each.
+Prepared rows_of_runs(std::size_t runs, unsigned per_run, unsigned gap = 3) {
+  Prepared data;
+  data.runs.resize(runs);
+  for (unsigned r = 0; r < runs; ++r) {
+    data.runs[r].interval = kStep / 4;
+    for (unsigned k = 0; k < per_run; ++k)
+      data.rows.push_back({.run = r,
+                           .sample = 4 * (k < per_run / 2 ? k : k + gap),
+                           .atom = 0,
+                           .block = 0,
+                           .chain = Chain::kTorque});
+  }
+  return data;
+}
+
+/// White noise, an Ornstein–Uhlenbeck process of this memory, and a zero of memory 100 s.
+Eigen::VectorXd noise(const Prepared& data, double white, double slow, double memory, double wander,
+                      unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd out(static_cast<Eigen::Index>(data.rows.size()));
+  double z = 0, d = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const bool begins = i == 0 || data.rows[i - 1].run != data.rows[i].run;
+    const double dt = begins ? 1e9 : kStep / 4 * (data.rows[i].sample - data.rows[i - 1].sample);
+    const double stay = std::exp(-dt / memory), keep = std::exp(-dt / 100);
+    z = stay * z + std::sqrt(slow * (1 - stay * stay)) * normal(random);
+    d = keep * d + std::sqrt(wander * (1 - keep * keep)) * normal(random);
+    out[static_cast<Eigen::Index>(i)] = std::sqrt(white) * normal(random) + z + d;
+  }
+  return out;
+}
+
+double correlation(const Prepared& data, const Eigen::VectorXd& x, std::size_t lag) {
+  double product = 0, squares = 0;
+  for (std::size_t i = lag; i < data.rows.size(); ++i) {
+    if (data.rows[i].run != data.rows[i - lag].run) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    product += x[k] * x[k - static_cast<Eigen::Index>(lag)];
+    squares += x[k] * x[k];
+  }
+  return product / squares;
+}
+
+TEST(Colour, is_gone_from_what_the_filter_leaves_and_comes_back_without_it) {
+  const Prepared data = rows_of_runs(6, 4000);
+  const Eigen::VectorXd before = noise(data, 1.0, 4.0, 0.2, 3.0, 1);
+  Weights weights;
+  weights.sigma[0] = 0.5;
+  weights.colour[0] = {.white = 4.0, .slow = 16.0, .memory = 0.2, .wander = 12.0};  // in units of σ²
+  weights.take(data);
+  Eigen::VectorXd rows = before;
+  weigh(data, weights, rows);
+  EXPECT_GT(correlation(data, before, 5), 0.6);
+  for (const std::size_t lag : {1U, 2U, 5U, 20U, 60U})
+    EXPECT_LT(std::abs(correlation(data, rows, lag)), 0.02) << lag;  // three sigma of 24 000 rows
+  EXPECT_NEAR(rows.squaredNorm() / static_cast<double>(rows.size()), 4.0, 0.15);  // the white part's variance
+  const Eigen::VectorXd back = unfiltered(data, weights, rows);
+  EXPECT_LT((back - before / 0.5).cwiseAbs().maxCoeff(), 1e-9);
+  // The same without what take() kept.
+  Weights plain = weights;
+  plain.filter.reset();
+  Eigen::VectorXd again = before;
+  weigh(data, plain, again);
+  EXPECT_EQ((again - rows).cwiseAbs().maxCoeff(), 0.0);
+}
+
+TEST(Colour, makes_of_a_jump_what_it_is_worth_beside_noise_that_cannot_jump) {
+  // Generalised least squares by the filter against the same by the covariance matrix itself.
+  const Prepared data = rows_of_runs(1, 300);
+  Weights weights;
+  weights.colour[0] = {.white = 1.0, .slow = 5.0, .memory = 0.3, .wander = 0};
+  Eigen::VectorXd jump(300);
+  for (Eigen::Index k = 0; k < 300; ++k) jump[k] = (k / 40) % 2 == 0 ? 1.0 : -1.0;
+  Eigen::MatrixXd covariance(300, 300);
+  for (Eigen::Index i = 0; i < 300; ++i)
+    for (Eigen::Index k = 0; k < 300; ++k) {
+      const double dt = kStep / 4 *
+                        std::abs(static_cast<double>(data.rows[static_cast<std::size_t>(i)].sample) -
+                                 static_cast<double>(data.rows[static_cast<std::size_t>(k)].sample));
+      covariance(i, k) = (i == k ? 1.0 : 0.0) + 5.0 * std::exp(-dt / 0.3);
+    }
+  Eigen::VectorXd rows = jump;
+  weigh(data, weights, rows);
+  const double exact = jump.dot(covariance.ldlt().solve(jump));
+  EXPECT_NEAR(rows.squaredNorm(), exact, 1e-9 * exact);
+}
+
+TEST(Colour, is_read_off_a_residual) {
+  const Prepared data = rows_of_runs(8, 5600, 0);
+  int wandering = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Colour slow = colour_of(data, noise(data, 1.0, 3.0, 0.15, 0.0, seed), Chain::kTorque);
+    EXPECT_NEAR(slow.slow, 3.0, 0.5) << seed;
+    EXPECT_NEAR(slow.memory, 0.15, 0.04) << seed;
+    wandering += slow.wander > 0 ? 1 : 0;
+    const Colour zero = colour_of(data, noise(data, 1.0, 0.0, 0.1, 8.0, 100 + seed), Chain::kTorque);
+    EXPECT_GT(zero.wander, 1.0) << seed;
+    EXPECT_LT(zero.wander, 40.0) << seed;  // eight runs of 45 s hold few turns of 100 s
+  }
+  EXPECT_LE(wandering, 1);  // three standard errors
+}
+
+/// Runs of the tied rig whose pressure readings carry slow noise, felt by the torque or not.
+std::vector<series::Recording> with_slow_pressure_noise(bool felt) {
+  const test::TiedRig rig;
+  PlannedRun steps = test::clamped(30, 0.1, 1.2, 5, "steps"), sines = test::clamped(30, -0.2, 1.0, 4);
+  PlannedRun hand = test::by_hand(30, 0.4, 1.5), other = test::by_hand(30, 0.4, 0.8, 0.5);
+  other.mean_pressure_kgcm2 = 3.5;
+  auto runs = test::record_all(rig, {steps, sines, hand, other});
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  for (series::Recording& run : runs) {
+    std::vector<double>*p1 = nullptr, *p2 = nullptr, *f1 = nullptr, *f2 = nullptr;
+    for (series::Column& c : run.columns) {
+      if (c.name == "p1") p1 = &c.values;
+      if (c.name == "p2") p2 = &c.values;
+      if (c.name == "F1") f1 = &c.values;
+      if (c.name == "F2") f2 = &c.values;
+    }
+    const double stay = std::exp(-0.002 / 0.3), fresh = std::sqrt(1 - stay * stay);
+    double z[2] = {normal(random), normal(random)};
+    for (std::size_t k = 0; k < p1->size(); ++k) {
+      for (double& value : z) value = stay * value + fresh * normal(random);
+      const double off1 = 2000 * z[0], off2 = 2000 * z[1];  // Pa
+      (*p1)[k] += off1;
+      (*p2)[k] += off2;
+      if (!felt) continue;
+      const double torque = rig.B * rig.radius * 0.5 * (off2 - off1);
+      (*f1)[k] -= 0.5 * torque / rig.radius;
+      (*f2)[k] += 0.5 * torque / rig.radius;
+    }
+  }
+  return runs;
+}
+
+TEST(QuietPressure, keeps_what_the_torque_follows_and_drops_what_only_the_sensor_says) {
+  const test::TiedRig rig;
+  for (const bool felt : {false, true}) {
+    const auto runs = with_slow_pressure_noise(felt);
+    Prepared data = prepare(runs, rig.facts(), {}, 2.0);
+    const QuietPressure quiet = QuietPressure::learn(data);
+    // The middle band holds most of it: memory 0.3 s.
+    if (felt) {
+      EXPECT_GT(quiet.felt()[1], 0.8);
+    } else {
+      EXPECT_LT(quiet.felt()[1], 0.25);
+    }
+  }
+}
+
+TEST(QuietPressure, leaves_readings_alone_without_commands) {
+  const test::TiedRig rig;
+  auto runs = test::record_all(rig, {test::by_hand(20, 0.4, 1.5), test::by_hand(20, 0.3, 0.7)});
+  for (series::Recording& run : runs)
+    std::erase_if(run.columns,
+                  [](const series::Column& c) { return c.name == "p1_cmd" || c.name == "p2_cmd"; });
+  Prepared data = prepare(runs, rig.facts(), {}, 2.0);
+  const std::vector<double> before = data.runs[0].pressure[0];
+  const QuietPressure quiet = QuietPressure::learn(data);
+  EXPECT_EQ(before, data.runs[0].pressure[0]);
+}
+
+}  // namespace
+}  // namespace isac::explain
