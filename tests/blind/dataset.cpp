@@ -128,4 +128,36 @@ Gap heldout_noise(const Dataset& d, const std::vector<Signals>& noisy) {
   return {torque.root(), pressure.root(), balance.root(), driven.root(), p1.root(), p2.root()};
 }
 
+Gap heldout_closes(const Dataset& d, const std::vector<Signals>& noisy) {
+  struct Mean {
+    double sum = 0, count = 0;
+    void add(const std::vector<double>& with, const std::vector<double>& without) {
+      for (std::size_t k = 0; k < with.size(); ++k) {
+        const double noise = with[k] - without[k];
+        sum += with[k] * with[k] - noise * noise;
+      }
+      count += static_cast<double>(with.size());
+    }
+    [[nodiscard]] double mean() const { return sum / std::max(1.0, count); }
+  };
+  Mean torque, driven, pressure, p1, p2, balance;
+  for (std::size_t i = 0; i < d.runs.size(); ++i) {
+    if (!d.runs[i].heldout) continue;
+    Signals forces = d.clean[i], pressures = d.clean[i];
+    forces.F1 = noisy[i].F1;
+    forces.F2 = noisy[i].F2;
+    pressures.p1 = noisy[i].p1;
+    pressures.p2 = noisy[i].p2;
+    const Residuals clean = residuals(d.rig, d.base, d.runs[i], d.clean[i]),
+                    force = residuals(d.rig, d.base, d.runs[i], forces),
+                    pressed = residuals(d.rig, d.base, d.runs[i], pressures);
+    torque.add(force.torque, clean.torque);
+    if (!d.runs[i].free) driven.add(force.torque, clean.torque);
+    for (Mean* m : {&pressure, &p1}) m->add(pressed.p1, clean.p1);
+    for (Mean* m : {&pressure, &p2}) m->add(pressed.p2, clean.p2);
+    balance.add(force.balance, clean.balance);
+  }
+  return {torque.mean(), pressure.mean(), balance.mean(), driven.mean(), p1.mean(), p2.mean()};
+}
+
 }  // namespace blind

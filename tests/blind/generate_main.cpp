@@ -75,10 +75,14 @@ int generate(const Words& words) {
   const bool testable = dataset.not_testable.empty();
   std::optional<blind::Verdict> verdict;
   if (words.oracle && testable && !dataset.hidings.empty()) verdict = blind::judge(dataset);
-  blind::Gap noise;
-  if (testable) noise = blind::heldout_noise(dataset, blind::write_dataset(dataset, words.out));
+  blind::Gap noise, closes;
+  if (testable) {
+    const std::vector<blind::Signals> noisy = blind::write_dataset(dataset, words.out);
+    noise = blind::heldout_noise(dataset, noisy);
+    closes = blind::heldout_closes(dataset, noisy);
+  }
   std::ofstream label(words.label);
-  label << blind::label_of(dataset, noise, verdict ? &*verdict : nullptr);
+  label << blind::label_of(dataset, noise, closes, verdict ? &*verdict : nullptr);
   if (!label.flush()) throw std::runtime_error("cannot write " + words.label.string());
   return testable ? 0 : 1;
 }

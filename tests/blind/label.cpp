@@ -16,19 +16,19 @@ void write_hiding(JsonWriter& json, const Hiding& h) {
 }
 
 void write_gap(JsonWriter& json, const char* name, const char* unit, double fitted, double heldout,
-               double noise) {
+               double noise, double closes) {
   // The true model leaves nothing of a gap that is free of noise.
   json.key(name)
       .open('{')
       .field("unit", unit)
       .field("fitted_before", fitted)
       .field("heldout_before", heldout);
-  json.field("heldout_after", 0.0).field("heldout_noise", noise).close('}');
+  json.field("heldout_after", 0.0).field("heldout_noise", noise).field("heldout_closes", closes).close('}');
 }
 
 }  // namespace
 
-std::string label_of(const Dataset& d, const Gap& noise, const Verdict* oracle) {
+std::string label_of(const Dataset& d, const Gap& noise, const Gap& closes, const Verdict* oracle) {
   const bool unknown = !d.hidings.empty() && !d.hidings.front().effect->catalogued;
   const char* kinds[] = {"none", "single", "pair"};
   JsonWriter json;
@@ -73,13 +73,14 @@ std::string label_of(const Dataset& d, const Gap& noise, const Verdict* oracle) 
     json.field("ratio", s.ratio).field("signal", s.signal);
   }
   json.key("gap").open('{');
-  write_gap(json, "torque", "N m", d.gap.torque, d.heldout_gap.torque, noise.torque);
-  write_gap(json, "pressure", "kg/cm2", d.gap.pressure, d.heldout_gap.pressure, noise.pressure);
-  write_gap(json, "balance", "N m", d.gap.balance, d.heldout_gap.balance, noise.balance);
+  write_gap(json, "torque", "N m", d.gap.torque, d.heldout_gap.torque, noise.torque, closes.torque);
+  write_gap(json, "pressure", "kg/cm2", d.gap.pressure, d.heldout_gap.pressure, noise.pressure,
+            closes.pressure);
+  write_gap(json, "balance", "N m", d.gap.balance, d.heldout_gap.balance, noise.balance, closes.balance);
   // What an answer's gap is counted on: the torque without the free runs, each pressure by itself.
-  write_gap(json, "driven", "N m", d.gap.driven, d.heldout_gap.driven, noise.driven);
-  write_gap(json, "p1", "kg/cm2", d.gap.p1, d.heldout_gap.p1, noise.p1);
-  write_gap(json, "p2", "kg/cm2", d.gap.p2, d.heldout_gap.p2, noise.p2);
+  write_gap(json, "driven", "N m", d.gap.driven, d.heldout_gap.driven, noise.driven, closes.driven);
+  write_gap(json, "p1", "kg/cm2", d.gap.p1, d.heldout_gap.p1, noise.p1, closes.p1);
+  write_gap(json, "p2", "kg/cm2", d.gap.p2, d.heldout_gap.p2, noise.p2, closes.p2);
   json.close('}');
   if (oracle == nullptr) {
     json.key("oracle").null();

@@ -9,7 +9,7 @@
 
 namespace blind {
 
-/// `oracle` may be null; `noise` is the residual noise on the held-out runs.
-std::string label_of(const Dataset& dataset, const Gap& noise, const Verdict* oracle);
+/// `oracle` may be null; `noise` is the residual noise on the held-out runs, `closes` what the true model takes out of them.
+std::string label_of(const Dataset& dataset, const Gap& noise, const Gap& closes, const Verdict* oracle);
 
 }  // namespace blind

@@ -264,11 +264,13 @@ std::string line_of(const Plan& plan, const Task& task) {
   const Scratch scratch;
   const blind::Dataset dataset = blind::make_dataset(task.request);
   const bool testable = dataset.not_testable.empty();
-  blind::Gap noise;
+  blind::Gap noise, closes;
   std::optional<blind::Verdict> verdict;
   std::optional<Outcome> outcome, baselines;
   if (testable) {
-    noise = blind::heldout_noise(dataset, blind::write_dataset(dataset, scratch.path / "dataset"));
+    const std::vector<blind::Signals> noisy = blind::write_dataset(dataset, scratch.path / "dataset");
+    noise = blind::heldout_noise(dataset, noisy);
+    closes = blind::heldout_closes(dataset, noisy);
     // Only a name can be tied with another: where none is right, nobody asks the oracle.
     const bool names = !dataset.hidings.empty() && dataset.hidings.front().effect->catalogued;
     if (plan.oracle && names && !task.left_out) verdict = blind::judge(dataset);
@@ -287,7 +289,7 @@ std::string line_of(const Plan& plan, const Task& task) {
       baselines = run_program({plan.baselines.string(), (scratch.path / "dataset").string()}, scratch.path,
                               plan.timeout);
   }
-  std::string label = blind::label_of(dataset, noise, verdict ? &*verdict : nullptr);
+  std::string label = blind::label_of(dataset, noise, closes, verdict ? &*verdict : nullptr);
   label.pop_back();  // its line end
   blind::JsonWriter json;
   json.open('{').field("key", task.key).key("label").raw(label);

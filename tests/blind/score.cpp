@@ -39,6 +39,7 @@ Truth read_truth(const json& label) {
   for (const auto& [signal, gap] : label.at("gap").items()) {
     t.gap[signal] = number(gap, "heldout_before");
     t.gap_noise[signal] = number(gap, "heldout_noise");
+    if (gap.contains("heldout_closes")) t.gap_closes[signal] = number(gap, "heldout_closes");
   }
   if (const json& oracle = label.at("oracle"); oracle.is_object()) {
     double nearest = 3.0;
@@ -99,7 +100,10 @@ double closed_share(const Truth& t, const Answer& a) {
   const double gap = t.gap.at(signal), noise = t.gap_noise.at(signal);
   if (gap * gap < 1e-3 * noise * noise)
     return -1.0;  // nothing to close in the signal that the answer speaks of
-  return (a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after) / (gap * gap);
+  const auto closes = t.gap_closes.find(signal);
+  const double true_closes = closes != t.gap_closes.end() ? closes->second : gap * gap;
+  if (true_closes < 0.2 * gap * gap) return -1.0;  // the recordings' own noise hides it
+  return (a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after) / true_closes;
 }
 
 }  // namespace

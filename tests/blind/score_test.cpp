@@ -101,6 +101,10 @@ TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
   EXPECT_NEAR(judge_case(one).closed, 1.0, 1e-12);
   one.answer.heldout_after = one.answer.heldout_before;
   EXPECT_NEAR(judge_case(one).closed, 0.0, 1e-12);
+  // Noise that happens to point the same way as the gap makes the true model close more.
+  one.answer.heldout_after = 0.02;
+  one.truth.gap_closes["driven"] = 1.25 * 0.01 * 0.01;
+  EXPECT_NEAR(judge_case(one).closed, 0.8, 1e-12);
 }
 
 TEST(Score, reads_a_line_of_results_and_survives_an_answer_that_is_none) {

@@ -87,13 +87,18 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
                : chain == Chain::kPressure1 ? "p1"
                                             : "p2";
   gap.unit = chain == Chain::kTorque ? baseline.output_unit : pressure ? "kg/cm2" : "N m";
-  gap.before = scale * raw_residual(predictor, found.baseline.model, chain).rms();
+  // Before: the baseline as anyone would fit it, by plain least squares and without tolerances. (What fits beside effects has them.)
+  Weights plain = found.weights;
+  for (Colour& colour : plain.colour) colour = {};
+  plain.filter.reset();
+  const ModelPoint user =
+      found.added.empty() ? found.baseline.model : fit_baseline(predictor, {}, plain, false).model;
+  gap.before = scale * raw_residual(predictor, user, chain).rms();
   gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
   gap.noise_floor = scale * (chain == Chain::kMotion ? found.weights.sigma[static_cast<int>(chain)]
                                                      : found.floors.white[static_cast<int>(chain)]);
   if (proof.runs() == 0) return;
-  const Sums before = proof.residual(found.baseline.model, chain),
-             after = proof.residual(found.model.model, chain);
+  const Sums before = proof.residual(user, chain), after = proof.residual(found.model.model, chain);
   gap.heldout_before = scale * before.rms();
   gap.heldout_after = scale * after.rms();
   gap.heldout_zero_model = scale * before.signal_rms();
@@ -181,7 +186,10 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   e.heldout_runs = proof.runs();
   fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
   // A model that does worse on what it has not seen is not an explanation.
-  if (!e.effects.empty() && e.gap.heldout_after > 1.002 * e.gap.heldout_before) e.verdict = Verdict::kUnknown;
+  if (!e.effects.empty() && proof.runs() > 0 &&
+      proof.residual(found.model.model, chain).rms() >
+          1.002 * proof.residual(found.baseline.model, chain).rms())
+    e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
   if (options.next_experiment && e.verdict != Verdict::kUnknown)
     e.next_experiment =

@@ -305,7 +305,7 @@ double Fit::value(const Coordinate& c) const {
 }
 
 Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances,
-                 const Weights& weights) {
+                 const Weights& weights, bool resting_angles) {
   Fit fit;
   for (const BaseParameter& b : predictor.base()) fit.model.base.push_back(b.start);
   for (const Hypothesis& h : tolerances) {
@@ -317,7 +317,7 @@ Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tole
   add_base(predictor, fit.model, kAllChains, fit.coordinates);
   for (std::size_t i = 0; i < tolerances.size(); ++i)
     fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
-  add_rest(predictor, fit.model, kAllChains, fit.coordinates);
+  if (resting_angles) add_rest(predictor, fit.model, kAllChains, fit.coordinates);
   solve(predictor, fit, weights, 30, false);
   return fit;
 }

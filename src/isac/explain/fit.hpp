@@ -39,9 +39,9 @@ struct Fit {
   [[nodiscard]] double value(const Coordinate& c) const;
 };
 
-/// The baseline alone, with its tolerances.
+/// The baseline alone, with its tolerances, and, if asked for, where within a step of the encoder each resting run stands.
 [[nodiscard]] Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances,
-                               const Weights& weights);
+                               const Weights& weights, bool resting_angles = true);
 /// `start.model` with `effects` added at their values, all refitted together.
 [[nodiscard]] Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
                         const Weights& weights, int iterations = 12);
