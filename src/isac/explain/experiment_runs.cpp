@@ -9,6 +9,7 @@
 namespace isac::explain {
 namespace {
 
+constexpr double kTaut = 5;                            // N that keep a muscle and its sensor taut
 constexpr double kSlowTone = 0.62, kSlowShare = 0.08;  // of a hand, which never repeats itself exactly
 constexpr double kSteepest = (1 - kSlowShare) + kSlowShare * kSlowTone;
 constexpr int kSubsteps = 8;                 // of the free joint per sample
@@ -171,7 +172,7 @@ void press(const series::Program& program, double gain, double lag, PreparedRun&
 bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run) {
   const std::size_t n = run.time.size();
   for (auto& force : run.force) force.resize(n);
-  double largest = 0;
+  double largest = 0, least = range.force_limit;
   for (std::size_t k = 0; k < n; ++k) {
     const double p1 = run.raw_pressure[0][k], p2 = run.raw_pressure[1][k];
     torque.move_to(run.angle[k], run.velocity[k], p1, p2, run.time[k]);
@@ -180,8 +181,9 @@ bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run
     run.force[0][k] = common - half;
     run.force[1][k] = common + half;
     largest = std::max(largest, common + std::abs(half));
+    least = std::min(least, common - std::abs(half));
   }
-  return largest <= range.force_limit;
+  return largest <= range.force_limit && least >= range.least_force;
 }
 
 void add_rows(Prepared& data, const RigRange& range) {
@@ -209,6 +211,7 @@ RigRange range_of(const Predictor& predictor, const series::ExcitationOptions& l
   RigRange range;
   range.limits = limits;
   double farthest = 0, fastest = 0, force = 0, force_sum = 0, pressure_sum = 0;
+  range.least_force = kTaut;
   bool driven = false, motion = false;
   for (const PreparedRun& run : data.runs) {
     driven = driven || (run.has_torque && run.has_pressure && !run.is_free);
@@ -221,6 +224,7 @@ RigRange range_of(const Predictor& predictor, const series::ExcitationOptions& l
     if (run.force[0].empty() || !run.has_pressure) continue;
     for (std::size_t k = 0; k < run.time.size(); ++k) {
       force = std::max({force, run.force[0][k], run.force[1][k]});
+      range.least_force = std::min({range.least_force, run.force[0][k], run.force[1][k]});
       force_sum += run.force[0][k] + run.force[1][k];
       pressure_sum += run.raw_pressure[0][k] + run.raw_pressure[1][k];
     }

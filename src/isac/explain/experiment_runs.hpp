@@ -25,10 +25,12 @@ namespace isac::explain {
 /// What the rig and its recordings so far allow for.
 struct RigRange {
   series::ExcitationOptions limits;
-  double angle = 0.4;          ///< rad, farthest that a planned motion goes
-  double speed = 6;            ///< rad/s
-  double common_force = 0;     ///< N/Pa, (F1 + F2)/2 over the mean pressure; 0 where forces are not known
-  double force_limit = 200;    ///< N
+  double angle = 0.4;        ///< rad, farthest that a planned motion goes
+  double speed = 6;          ///< rad/s
+  double common_force = 0;   ///< N/Pa, (F1 + F2)/2 over the mean pressure; 0 where forces are not known
+  double force_limit = 200;  ///< N
+  double least_force =
+      0;  ///< N, below which no muscle is let: it hangs slack, unless the recordings went there too
   bool moves_freely = false;   ///< the inertia is known, so that a free joint says something
   bool free_torque = false;    ///< rows of the torque are taken from free runs too
   bool valves = false;         ///< commands are recorded: the valve unit is in the model

@@ -338,6 +338,7 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       also([](Hypothesis& o) { o.clock = Clock::kDay; });
   }
 
+  library.tolerances.reserve(8);  // models point at them, and a search may add some
   if (seed) {
     tolerate(library, data, "time_skew", -0.5 * reach.interval, 0.5 * reach.interval);
     tolerate(library, data, "dead_time", -reach.interval, 0);

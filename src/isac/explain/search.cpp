@@ -42,6 +42,7 @@ class Search {
     take_colour();
     forward();
     if (found_.added.size() > 1) swap_and_drop();
+    if (found_.adequate) leave_half_a_step();
     return std::move(found_);
   }
 
@@ -371,6 +372,23 @@ class Search {
       return true;
     }
     return false;
+  }
+
+  /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
+  /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.)
+  void leave_half_a_step() {
+    if (found_.added.empty() || !std::isfinite(data_.rig.angle_step) || !data_.baseline.terms.empty()) return;
+    std::vector<Active> effects(
+        found_.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found_.model.tolerances),
+        found_.model.model.effects.end());
+    const bool an_offset = std::any_of(effects.begin(), effects.end(), [](const Active& a) {
+      const std::string id = a.hypothesis->id();
+      return id == "encoder_offset" || id == "torque_offset";
+    });
+    if (an_offset || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return;
+    tolerate(library_, data_, "encoder_offset", -0.5 * data_.rig.angle_step, 0.5 * data_.rig.angle_step);
+    const Fit base = fit_baseline(predictor_, library_.tolerances, found_.weights);
+    move_to(refit(predictor_, base, effects, found_.weights, 8));
   }
 
   /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
