@@ -358,6 +358,10 @@ class Search {
       if (!t.in_set) continue;
       const std::string id = ranking_.id_of(t);
       const double step_angle = data_.rig.angle_step, interval = data_.runs.front().interval;
+      // Once: what lies beyond a tolerance that is there already is an effect, however near.
+      if (std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
+                      [&](const Hypothesis& h) { return h.id() == id && h.upper[0] > 0; }))
+        continue;
       if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5)) {
         tolerate(library_, data_, id, -0.5 * step_angle, 0.5 * step_angle);
       } else if (id == "dead_time" &&
