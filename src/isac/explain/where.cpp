@@ -198,7 +198,10 @@ std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::V
     best.says *= known * (std::string(v.unit) == "s" ? kTimeCounts : 1.0);
     best.share *= known;
     const double range = borders.back() - borders.front();
-    if (std::abs(best.low) < 1e-6 * range) best.low = 0;
+    for (double* end : {&best.low, &best.high})
+      if (std::abs(*end) < 1e-6 * range) *end = 0;
+    // A variable that rests (pressures free of their noise do) differs by nothing that could be read: no region.
+    if (rounded(best.low) == rounded(best.high)) continue;
     if (best.says >= kWorthSaying)
       found.emplace_back(best.says, Region{"", "", v.name, best.low, best.high, v.unit, best.share});
   }
