@@ -111,7 +111,7 @@ Designer::Designer(Tie tie, const ExperimentOptions& options) : tie_(std::move(t
   if (tie_.models.size() > kMostModels) tie_.models.resize(kMostModels);
   const Predictor& predictor = *tie_.predictor;
   options_.limits.initial_pressure = predictor.data().rig.initial_pressure;
-  range_ = range_of(predictor, options_.limits);
+  range_ = range_of(predictor, tie_.stem.model, options_.limits);
   if (range_.free_row_noise > 0)
     tie_.weights.sigma[3] = std::hypot(tie_.weights.sigma[0], range_.free_row_noise);
   candidates_ = candidate_runs(range_, predictor.data().rig);

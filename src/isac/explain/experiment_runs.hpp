@@ -28,6 +28,7 @@ struct RigRange {
   double angle = 0.4;        ///< rad, farthest that a planned motion goes
   double speed = 6;          ///< rad/s
   double common_force = 0;   ///< N/Pa, (F1 + F2)/2 over the mean pressure; 0 where forces are not known
+  double stiffness = 0;      ///< N m/rad, −A r² of the model; 0 where there is none
   double force_limit = 200;  ///< N
   double least_force =
       0;  ///< N, below which no muscle is let: it hangs slack, unless the recordings went there too
@@ -40,7 +41,12 @@ struct RigRange {
       0;  ///< N m, of a row of the motion chain if none has been recorded: the encoder's steps
 };
 
-[[nodiscard]] RigRange range_of(const Predictor& predictor, const series::ExcitationOptions& limits);
+[[nodiscard]] RigRange range_of(const Predictor& predictor, const ModelPoint& model,
+                                const series::ExcitationOptions& limits);
+
+/// A parameter of the baseline by its name, or `otherwise` where the baseline has none of that name.
+[[nodiscard]] double base_value(const Predictor& predictor, const ModelPoint& model, const char* name,
+                                double otherwise);
 
 /// About 150 of them, of all kinds, in a fixed order.
 [[nodiscard]] std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& rig);

@@ -1,0 +1,189 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/experiment_runs.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kTaut = 5;            // N that keep a muscle and its sensor taut
+constexpr double kOfAngleLimit = 0.9;  // a planned motion stays this far inside
+
+/// rad either way of rest that leave both muscles taut at a mean pressure; a tenth is kept for what moves besides.
+double taut_amplitude(const RigRange& range, const RigFacts& rig, double mean_pressure) {
+  constexpr double kShare = 0.9, kLeast = 0.02;  // rad: an encoder sees no less
+  if (!(range.common_force > 0) || !(range.stiffness > 0)) return range.angle;
+  const double spare = range.common_force * mean_pressure - range.least_force;
+  return std::max(kLeast, kShare * 2 * rig.wheel_radius * spare / range.stiffness);
+}
+
+}  // namespace
+
+RigRange range_of(const Predictor& predictor, const ModelPoint& model,
+                  const series::ExcitationOptions& limits) {
+  const Prepared& data = predictor.data();
+  RigRange range;
+  range.limits = limits;
+  double farthest = 0, fastest = 0, force = 0, force_sum = 0, pressure_sum = 0;
+  range.least_force = kTaut;
+  bool driven = false, motion = false;
+  for (const PreparedRun& run : data.runs) {
+    driven = driven || (run.has_torque && run.has_pressure && !run.is_free);
+    for (std::size_t k = 0; k < run.angle.size(); ++k) {
+      farthest = std::max(farthest, std::abs(run.angle[k]));
+      fastest = std::max(fastest, std::abs(run.velocity[k]));
+    }
+    if (!run.time.empty()) range.day_offset = std::max(range.day_offset, run.day_offset + run.time.back());
+    if (run.interval > 0) range.row_spacing = run.interval * data.stride;
+    if (run.force[0].empty() || !run.has_pressure) continue;
+    for (std::size_t k = 0; k < run.time.size(); ++k) {
+      force = std::max({force, run.force[0][k], run.force[1][k]});
+      range.least_force = std::min({range.least_force, run.force[0][k], run.force[1][k]});
+      force_sum += run.force[0][k] + run.force[1][k];
+      pressure_sum += run.raw_pressure[0][k] + run.raw_pressure[1][k];
+    }
+  }
+  for (const Row& row : data.rows) {
+    range.valves = range.valves || row.chain == Chain::kPressure1;
+    motion = motion || row.chain == Chain::kMotion;
+    range.free_torque = range.free_torque || (row.chain == Chain::kTorque && data.runs[row.run].is_free);
+  }
+  range.free_torque = range.free_torque || !driven;
+  range.day_offset += 60;
+  range.moves_freely = std::isfinite(data.rig.inertia) && data.rig.inertia > 0;
+  range.angle = std::clamp(1.1 * farthest, 0.25, kOfAngleLimit * limits.angle_limit);
+  range.speed = std::clamp(1.1 * fastest, 2.0, limits.speed_limit);
+  if (pressure_sum > 0) range.common_force = force_sum / pressure_sum;
+  const double r = data.rig.wheel_radius;
+  range.stiffness = std::max(0.0, -base_value(predictor, model, "A", 0.0) * r * r);
+  range.force_limit = std::max(limits.force_limit, force);
+  if (!motion && range.moves_freely && std::isfinite(data.rig.angle_step)) {
+    // White noise of deviation s leaves s √(3/(8 √π)) σ^−5/2 √Δt of itself in a second derivative by a Gaussian of σ.
+    const double white = data.rig.angle_step / std::sqrt(12.0);
+    range.free_row_noise = data.rig.inertia * white * std::sqrt(3 / (8 * std::sqrt(kPi))) *
+                           std::pow(data.smoothing.motion, -2.5) * std::sqrt(range.row_spacing / data.stride);
+  }
+  return range;
+}
+
+std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& rig) {
+  constexpr double kPlain = 20, kLong = 60;  // s
+  const double p0 = rig.initial_pressure / kPascalPerKgfCm2, far = 0.85 * range.angle;
+  // From where the torque is nothing, at the lowest mean pressure of the run.
+  const auto within = [&](double amplitude, double lowest_kgcm2) {
+    return std::min(amplitude, taut_amplitude(range, rig, lowest_kgcm2 * kPascalPerKgfCm2));
+  };
+  std::vector<PlannedRun> runs;
+  const auto add = [&](PlannedRun run) {
+    run.seconds = std::max(run.seconds, std::min(kLong, least_seconds(run)));
+    runs.push_back(run);
+  };
+  const double levels[] = {0.55 * p0, 0.75 * p0, p0, 1.2 * p0, 1.4 * p0};
+  // By hand, at constant pressures and with the mean pressure moving.
+  const double speeds[] = {0.04, 0.15, 0.5, 1.5, 0.9 * range.speed};
+  for (const double mean : levels)
+    for (const double speed : speeds)
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = mean,
+           .amplitude_rad = within(far, mean),
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.03, 0.1, 0.4, 1.5})
+    for (const double part : {0.1, 0.35})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = within(part * far, p0),
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.15, 0.6, 0.8 * range.speed})
+    for (const double difference : {-1.2, -0.6, 0.6, 1.2})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .delta_pressure_kgcm2 = difference,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = within(0.6 * far, p0),
+           .peak_speed_rad_s = speed,
+           .waveform = "hold"});
+  for (const double speed : {0.15, 0.6, 0.8 * range.speed})
+    for (const char* waveform : {"triangle", "steps"})
+      add({.experiment = "constant-pressure",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = within(far, 0.65 * p0),
+           .peak_speed_rad_s = speed,
+           .pressure_swing_kgcm2 = 0.35 * p0,
+           .pressure_period_s = 10,
+           .waveform = waveform});
+  // Clamped: Δp about nothing.
+  struct Wave {
+    const char* waveform;
+    double period;
+  };
+  for (const double at : {0.0, 0.45, -0.45, 0.9, -0.9})
+    for (const Wave wave : {Wave{"triangle", 8}, Wave{"steps", 4}, Wave{"sine", 1}, Wave{"sine", 0.25}})
+      for (const double swing : {0.4, 1.5}) {
+        if (swing < 1 && at != 0) continue;
+        add({.experiment = "constant-angle",
+             .seconds = kPlain,
+             .mean_pressure_kgcm2 = p0,
+             .middle_rad = at * far,
+             .pressure_swing_kgcm2 = swing,
+             .pressure_period_s = wave.period,
+             .waveform = wave.waveform});
+      }
+  for (const double mean : {0.6 * p0, 1.3 * p0})
+    for (const double at : {-0.6, 0.6})
+      add({.experiment = "constant-angle",
+           .seconds = kPlain,
+           .mean_pressure_kgcm2 = mean,
+           .middle_rad = at * far,
+           .pressure_swing_kgcm2 = 0.4 * p0,
+           .pressure_period_s = 8,
+           .waveform = "triangle"});
+  // Free: decay after steps, broadband, tones.
+  if (range.moves_freely)
+    for (const double mean : {0.7 * p0, p0, 1.25 * p0})
+      for (const double swing : {0.25, 0.8})
+        for (const Wave wave : {Wave{"steps", 5}, Wave{"steps", 1.2}, Wave{"triangle", 8}, Wave{"sine", 2},
+                                Wave{"sine", 0.7}, Wave{"sine", 0.25}})
+          add({.experiment = "free",
+               .seconds = kPlain,
+               .mean_pressure_kgcm2 = mean,
+               .pressure_swing_kgcm2 = swing,
+               .pressure_period_s = wave.period,
+               .waveform = wave.waveform});
+  // The valve unit, both muscles together.
+  if (range.valves)
+    for (const double mean : {0.7 * p0, 1.1 * p0})
+      for (const double swing : {0.05, 0.25, 1.0, 1.7})
+        for (const Wave wave : {Wave{"steps", 4}, Wave{"steps", 0.6}, Wave{"triangle", 10}, Wave{"sine", 0.5},
+                                Wave{"sine", 0.15}})
+          add({.experiment = "pcu-step",
+               .seconds = kPlain,
+               .mean_pressure_kgcm2 = mean,
+               .pressure_swing_kgcm2 = swing,
+               .pressure_period_s = wave.period,
+               .waveform = wave.waveform});
+  // Long holds, for what is slow.
+  for (const char* experiment : {"constant-angle", "free", "constant-pressure"}) {
+    if (std::string_view(experiment) == "free" && !range.moves_freely) continue;
+    for (const double period : {30.0, 80.0})
+      add({.experiment = experiment,
+           .seconds = kLong,
+           .mean_pressure_kgcm2 = p0,
+           .amplitude_rad = within(far, p0 - 0.8),
+           .middle_rad = std::string_view(experiment) == "constant-angle" ? 0.5 * far : kNotKnown,
+           .peak_speed_rad_s = 0.4,
+           .pressure_swing_kgcm2 = 0.8,
+           .pressure_period_s = period,
+           .waveform = "steps"});
+  }
+  return runs;
+}
+
+}  // namespace isac::explain
