@@ -146,10 +146,12 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
         if (!run.has_command) continue;
         const Predictor::FullRate rate = predictor.full_rate(quiet.model_, r);
         const Rules rules(run, rate.pressure, lag, i);
+        // Low-passed as the reading is: of a first-order lag, a Gaussian makes σ²/(2 T²) of what is still to come.
+        const std::vector<double> predicted = low_pass(rate.pressure[i], data.smoothing.torque / run.interval);
         for (std::size_t k = 0; k < run.time.size(); k += kStride)
           if (run.usable[k] != 0 && run.time[k] > kSettled) {
             rows.push_back(rules.at(k));
-            off.push_back((run.smooth_pressure[i][k] - rate.pressure[i][k]) / kPascalPerKgfCm2);
+            off.push_back((run.smooth_pressure[i][k] - predicted[k]) / kPascalPerKgfCm2);
           }
       }
       if (rows.size() < 20 * kFunctions) return quiet;

@@ -10,7 +10,6 @@
 #include <numeric>
 #include <random>
 #include <thread>
-#include <tuple>
 #include <utility>
 
 #include "isac/series/statistics.hpp"
@@ -25,10 +24,6 @@ constexpr double kMimicked = 1e-5;  // of a response's squares left by the proje
 constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
 constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
 constexpr int kBlocksElsewhere = 20;
-
-double upper_tail(double z) {
-  return 0.5 * std::erfc(z / std::sqrt(2.0));
-}
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
@@ -104,8 +99,12 @@ class Elsewhere {
     }
   }
 
-  /// Largest variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell.
-  double scatter(int chain, const Eigen::VectorXd& own_norm2) const {
+  struct Scatter {
+    double largest =
+        0;  ///< variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell
+    int blocks = 0;  ///< that it was measured in
+  };
+  Scatter scatter(int chain, const Eigen::VectorXd& own_norm2) const {
     std::vector<Eigen::Index> order(static_cast<std::size_t>(own_norm2.size()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     std::sort(order.begin(), order.end(),
@@ -118,7 +117,7 @@ class Elsewhere {
       held += own_norm2[b];
       own[static_cast<std::size_t>(b)] = 1;
     }
-    double largest = 0;
+    Scatter found;
     const Functions& f = chains_[chain];
     for (std::size_t k = 0; k < f.score2.size(); ++k) {
       double score2 = 0, norm2 = 0;
@@ -131,10 +130,10 @@ class Elsewhere {
         norm2 += f.norm2[k][b];
         ++blocks;
       }
-      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum())
-        largest = std::max(largest, score2 / norm2);
+      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum() && score2 > found.largest * norm2)
+        found = {score2 / norm2, blocks};
     }
-    return largest;
+    return found;
   }
 
  private:
@@ -372,7 +371,8 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
                              : bit(c.chain);
   };
   for (Column& c : result.columns) {
-    c.T = c.rare_z = 0;
+    c.T = 0;
+    c.rare_p = 1;
     if (c.norm2 <= 0) continue;
     const double scatter2 = joined(c.atom_score).squaredNorm();
     c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
@@ -382,8 +382,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
   }
   if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
   Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
-  double rare = 0;
-  std::size_t rare_columns = 0;
+  double rare_columns = 0;
   const Elsewhere elsewhere(result.columns, joined, std::move(seen));
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
@@ -394,35 +393,43 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     if (c.norm2 > 0 && c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most) && c.hypothesis >= 0) {
       const Eigen::VectorXd own = joined(c.atom_norm);
       double unit = 1;
+      int seen_in = static_cast<int>(blocks);
       for (int chain = 0; chain < kChains; ++chain) {
         if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
-        const double there = elsewhere.scatter(chain, own);
-        unit = std::max(unit, there > 0 ? there : std::numeric_limits<double>::infinity());
+        const Elsewhere::Scatter there = elsewhere.scatter(chain, own);
+        unit = std::max(unit, there.blocks > 0 ? there.largest : std::numeric_limits<double>::infinity());
+        seen_in = std::min(seen_in, there.blocks);
       }
-      c.rare_z = std::abs(c.score) / std::sqrt(unit * c.norm2);
+      if (std::isfinite(unit))
+        c.rare_p = series::student_t_two_sided(std::abs(c.score) / std::sqrt(unit * c.norm2), seen_in);
       ++rare_columns;
     }
-    rare = std::max(rare, c.rare_z);
+  }
+  result.rare_p = 1;
+  for (Column& c : result.columns) {
+    c.rare_p = std::min(1.0, c.rare_p * rare_columns);
+    result.rare_p = std::min(result.rare_p, c.rare_p);
   }
   const FlipTest test = flip_test(scores, options.flips, options.seed, options.significance);
   result.p_value = test.p_value;
   result.max_T = test.statistic;
   result.limit = test.limit;
-  result.rare_limit = std::sqrt(2.0) * 3.2 + 0.3 * std::log(1.0 + static_cast<double>(rare_columns));
-  result.rare_p =
-      std::min(1.0, 2 * upper_tail(rare) * static_cast<double>(std::max<std::size_t>(1, rare_columns)));
 
   // The best shape speaks for a hypothesis.
-  std::map<std::pair<int, int>, std::pair<double, double>>
-      tests;  // largest T and rare score of a shape's columns
+  struct OfShape {
+    double T = 0, rare_p = 1;
+  };
+  std::map<std::pair<int, int>, OfShape> tests;
   for (const Column& c : result.columns) {
-    auto& t = tests[{c.hypothesis, c.shape}];
-    t.first = std::max(t.first, c.T);
-    t.second = std::max(t.second, c.rare_z);
+    OfShape& t = tests[{c.hypothesis, c.shape}];
+    t.T = std::max(t.T, c.T);
+    t.rare_p = std::min(t.rare_p, c.rare_p);
   }
   std::vector<Screened> best(library.hypotheses.size());
   for (Screened& s : result.shapes) {
-    std::tie(s.T, s.rare_z) = tests[{s.hypothesis, s.shape}];
+    const OfShape& t = tests[{s.hypothesis, s.shape}];
+    s.T = t.T;
+    s.rare_p = t.rare_p;
     Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
     const double reach = std::max(b.reach, s.reach);
     if (b.hypothesis < 0 || s.gain > b.gain) b = s;

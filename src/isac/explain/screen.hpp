@@ -7,7 +7,8 @@
 ///
 /// A flip leaves the distribution of noise as it is, however it is coloured within a block; no noise model enters.
 /// T has no power where an effect shows in a few blocks only (a slip, a stop that is hardly touched), because those blocks are
-/// their own yardstick: for these the score is measured by what blocks elsewhere scatter (`rare`, Bonferroni).
+/// their own yardstick: for these the score is measured by what blocks elsewhere scatter (`rare`: Student's t over as many
+/// blocks, Bonferroni over as many columns).
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -36,7 +37,7 @@ struct Column {
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
-  double rare_z = 0;
+  double rare_p = 1;  ///< of its score against the scatter of blocks elsewhere, times the columns so tested
 };
 
 struct Screened {
@@ -44,7 +45,7 @@ struct Screened {
   Values start{};     ///< amplitudes as a linear fit would have them
   double gain = 0;    ///< drop of the loss by that linear fit, within the signs that the effect allows
   double T = 0;       ///< largest of its columns
-  double rare_z = 0;  ///< largest of its columns' scores against the scatter of blocks elsewhere
+  double rare_p = 1;  ///< smallest of its columns
   double chain_norm2[kChains] = {};  ///< Σ of its response's squares as they are in time, by chain
   double reach =
       0;  ///< sigma that the effect would make at its typical size: below 3 it cannot be tested here
@@ -56,9 +57,8 @@ struct Screen {
   std::vector<Column> columns;       ///< all, without their rows
   double max_T = 0;
   double p_value = 1;  ///< of the largest T, by flips
-  double limit = 0,
-         rare_limit = 0;  ///< T and rare score beyond which a column is significant in this whole search
-  double rare_p = 1;      ///< of the largest rare score, Bonferroni
+  double limit = 0;    ///< T beyond which a column is significant in this whole search
+  double rare_p = 1;   ///< smallest of all columns
   double noise_unit =
       1;  ///< variance of a score per unit of norm, the middle of all columns: 1 for white rows
 };

@@ -152,8 +152,8 @@ class Search {
     return gate;
   }
 
-  static bool significant(const Screened& c, const Screen& s) {
-    return c.T >= s.limit || c.rare_z >= s.rare_limit;
+  bool significant(const Screened& c, const Screen& s) const {
+    return c.T >= s.limit || c.rare_p <= 0.5 * options_.significance;
   }
 
   double floor_of(int chain) const {
