@@ -233,16 +233,22 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
   return shared;
 }
 
-/// The terms of the baseline at the rows of the torque chain, one after another, for unit parameters.
+/// The terms of the baseline at the rows of the torque chain, one after another, for unit parameters. A row is low-passed, g ∗ φ̇³ is not
+/// (g ∗ φ̇)³: to the second order of the kernel's σ it is w³ + 3 σ² w ẇ², w = g ∗ φ̇.
 void Predictor::add_columns(std::size_t index, Inputs& in) const {
-  const double one = 1;
+  const double one = 1, spread2 = data_->smoothing.torque * data_->smoothing.torque;
   in.columns.clear();
   for (std::size_t i = data_->run_begin[index]; i < data_->run_begin[index + 1]; ++i) {
     if (data_->rows[i].chain != Chain::kTorque) continue;
     const JointPoint<double> x = point_at(data_->rig, {}, *in.angle, *in.velocity, *in.acceleration,
                                           in.pressure, 0, data_->rows[i].sample);
+    JointPoint<double> cubic = x;
+    cubic.velocity =
+        std::cbrt(x.velocity * (x.velocity * x.velocity + 3 * spread2 * x.acceleration * x.acceleration));
     for (std::size_t j = 0; j < terms_.size(); ++j)
-      in.columns.push_back(term_sign_[j] * models::effect_torque(terms_[j], &one, x));
+      in.columns.push_back(
+          term_sign_[j] *
+          models::effect_torque(terms_[j], &one, static_cast<int>(j) == cubic_damping_ ? cubic : x));
   }
 }
 
