@@ -30,24 +30,65 @@ double linear_between(const std::vector<double>& x, double at) {
   return (1 - s) * x[i] + s * x[i + 1];
 }
 
-/// A reading with play stands half the play behind the motion; while it stands still after a turn, the joint crosses the play,
-/// slowly at first.
-void undo_play(const std::vector<double>& velocity, double half, std::vector<double>& angle) {
-  double side = 0;
-  std::size_t moved = 0;  // the sample after the last one in motion
-  for (std::size_t k = 0; k < angle.size(); ++k) {
-    if (velocity[k] == 0) continue;
-    const double now = velocity[k] > 0 ? 1.0 : -1.0;
-    if (side == 0) side = now;  // where in its play it started is not known; from the first motion on it is
-    for (std::size_t i = moved; i < k; ++i) {
-      const double share = static_cast<double>(i - moved + 1) / static_cast<double>(k - moved + 1);
-      angle[i] += half * (side + (now - side) * share * share);
-    }
-    angle[k] += half * now;
-    side = now;
-    moved = k + 1;
+/// A count of the encoder: the sample at which it is first read, which way it went, and by how many steps.
+struct Count {
+  std::size_t sample;
+  double way, steps;
+};
+
+std::vector<Count> counts_of(const std::vector<double>& angle, double step) {
+  std::vector<Count> counts;
+  for (std::size_t k = 1; k < angle.size(); ++k) {
+    const double change = angle[k] - angle[k - 1];
+    if (std::abs(change) > 0.5 * step)
+      counts.push_back({k, change > 0 ? 1.0 : -1.0, std::round(std::abs(change) / step)});
   }
-  for (std::size_t i = moved; i < angle.size(); ++i) angle[i] += half * side;
+  return counts;
+}
+
+/// Value at `at` of the polynomial through n points.
+double lagrange(const double* t, const double* y, int n, double at) {
+  double sum = 0;
+  for (int i = 0; i < n; ++i) {
+    double share = y[i];
+    for (int j = 0; j < n; ++j)
+      if (j != i) share *= (at - t[j]) / (t[i] - t[j]);
+    sum += share;
+  }
+  return sum;
+}
+
+/// A reading with play stands half the play behind the motion. Between the last count one way and the first one back the reading
+/// stands, and the joint goes on, turns and crosses the play: it passed the same edge of the encoder's step at both counts, half the play on
+/// either side, and the edge before at the counts before and after. A polynomial through these four says where it was between.
+void undo_play(double step, double half, std::vector<double>& angle) {
+  const std::vector<Count> counts = counts_of(angle, step);
+  if (counts.empty()) return;
+  // Where in its play it started is not known; from the first count on it is.
+  for (std::size_t k = 0; k < counts.front().sample; ++k) angle[k] += half * counts.front().way;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const Count& count = counts[i];
+    const bool last = i + 1 == counts.size();
+    const std::size_t end = last ? angle.size() : counts[i + 1].sample;
+    if (last || counts[i + 1].way == count.way) {
+      for (std::size_t k = count.sample; k < end; ++k) angle[k] += half * count.way;
+      continue;
+    }
+    const auto time = [&](std::size_t c) { return static_cast<double>(counts[c].sample) - 0.5; };
+    double t[4] = {time(i), time(i + 1)}, y[4] = {half, -half};
+    int n = 2;
+    if (i > 0 && counts[i - 1].way == count.way && count.steps < 1.5) {
+      t[n] = time(i - 1);
+      y[n++] = half - step;
+    }
+    if (i + 2 < counts.size() && counts[i + 2].way != count.way && counts[i + 1].steps < 1.5) {
+      t[n] = time(i + 2);
+      y[n++] = -half - step;
+    }
+    const double edge = angle[count.sample] - 0.5 * step * count.way;
+    for (std::size_t k = count.sample; k < end; ++k)
+      angle[k] = edge + count.way * std::clamp(lagrange(t, y, n, static_cast<double>(k)), -half, half + step);
+  }
 }
 
 }  // namespace
@@ -68,7 +109,7 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
     const Hypothesis& h = *(*it)->hypothesis;
     const double* q = (*it)->values.data();
     if (h.info().state_count > 0) {
-      undo_play(run.dry_velocity, q[0], truth);
+      undo_play(data_->rig.angle_step, q[0], truth);
       continue;
     }
     const std::vector<double> read = truth;

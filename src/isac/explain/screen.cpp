@@ -22,6 +22,8 @@ constexpr double kMimicked = 1e-5;  // of a response's squares left by the proje
 // T cannot pass the square root of the blocks that carry a column: with fewer than these, and most of the chain elsewhere, it has
 // no power in a whole search.
 constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
+// And with fewer than these it can pass a whole search's limit, about 4, only if they all agree.
+constexpr double kBoundingBlocks = 25;
 constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
 constexpr int kBlocksElsewhere = 20;
 
@@ -78,6 +80,14 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
     for (Eigen::Index i = 0; i < k; ++i) best.amplitude[use[static_cast<std::size_t>(i)]] = a[i];
   }
   return best;
+}
+
+/// p-value of a score whose own part is taken out of its scatter: t = Σ g / √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n.
+double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, double carried_by) {
+  const double all = norm2.sum(), amplitude = score.sum() / all;
+  const Eigen::ArrayXd left = (score - amplitude * norm2).array() / (1 - (norm2.array() / all).min(0.99));
+  const double scatter = std::sqrt(left.square().sum());
+  return scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / scatter, carried_by - 1) : 1.0;
 }
 
 struct Task {
@@ -390,8 +400,9 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     double most = 0;
     for (int chain = 0; chain < kChains; ++chain)
       if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
-    if (c.norm2 > 0 && c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most) && c.hypothesis >= 0) {
-      const Eigen::VectorXd own = joined(c.atom_norm);
+    if (c.norm2 <= 0 || c.hypothesis < 0 || c.carried_by >= kBoundingBlocks) continue;
+    const Eigen::VectorXd own = joined(c.atom_norm);
+    if (c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most)) {
       double unit = 1;
       int seen_in = static_cast<int>(blocks);
       for (int chain = 0; chain < kChains; ++chain) {
@@ -402,8 +413,10 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
       }
       if (std::isfinite(unit))
         c.rare_p = series::student_t_two_sided(std::abs(c.score) / std::sqrt(unit * c.norm2), seen_in);
-      ++rare_columns;
+    } else {
+      c.rare_p = jackknife_p(scores.col(static_cast<Eigen::Index>(k)), own, c.carried_by);
     }
+    ++rare_columns;
   }
   result.rare_p = 1;
   for (Column& c : result.columns) {

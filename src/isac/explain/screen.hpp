@@ -6,9 +6,10 @@
 ///   T = |Σ g_b| / √(Σ g_b²)      and the largest T over all responses, its p-value by flipping the signs of whole blocks
 ///
 /// A flip leaves the distribution of noise as it is, however it is coloured within a block; no noise model enters.
-/// T has no power where an effect shows in a few blocks only (a slip, a stop that is hardly touched), because those blocks are
-/// their own yardstick: for these the score is measured by what blocks elsewhere scatter (`rare`: Student's t over as many
-/// blocks, Bonferroni over as many columns).
+/// T cannot pass the square root of the blocks that carry an effect, because those blocks are their own yardstick. Where they are few
+/// (decays of the free joint), the effect's own part is taken out of the scatter first: jackknife over blocks, Student's t. Where they are
+/// hardly any (a slip, a stop that is hardly touched), the score is measured by what blocks elsewhere scatter. `rare`: both,
+/// Bonferroni over as many columns.
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -37,7 +38,7 @@ struct Column {
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
-  double rare_p = 1;  ///< of its score against the scatter of blocks elsewhere, times the columns so tested
+  double rare_p = 1;      ///< where few blocks carry it, times the columns so tested
 };
 
 struct Screened {

@@ -130,16 +130,25 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   // Pieces without gaps.
   std::vector<std::vector<double>> pieces;
   double spacing = 0;
-  unsigned step = 0;
+  unsigned step = 0;  // the shortest: a chain may begin with a gap
   const Row* last = nullptr;
+  const auto follows = [&](const Row& row) {
+    return last != nullptr && last->run == row.run && row.sample > last->sample;
+  };
+  for (const Row& row : data.rows) {
+    if (row.chain != chain) continue;
+    if (follows(row) && (step == 0 || row.sample - last->sample < step)) {
+      step = row.sample - last->sample;
+      spacing = step * data.runs[row.run].interval;
+    }
+    last = &row;
+  }
+  last = nullptr;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const Row& row = data.rows[i];
     if (row.chain != chain) continue;
-    const bool same = last != nullptr && last->run == row.run && row.sample > last->sample;
-    if (same && step == 0) step = row.sample - last->sample;
-    if (!same || row.sample - last->sample != step) pieces.emplace_back();
+    if (!follows(row) || row.sample - last->sample != step) pieces.emplace_back();
     pieces.back().push_back(residual[static_cast<Eigen::Index>(i)]);
-    if (spacing == 0 && same) spacing = step * data.runs[row.run].interval;
     last = &row;
   }
   Colour none;
@@ -204,6 +213,7 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
       product += count[lag] * (covariance[lag] - wander) * shape;
       squares += count[lag] * shape * shape;
     }
+    if (!(squares > 0)) continue;  // too many gaps
     const double slow = std::clamp(product / squares, 0.0, covariance[0]);
     for (std::size_t lag = first; lag <= lags; ++lag) {
       const double off =
