@@ -249,6 +249,7 @@ std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint
   data.stride = 2;
   PreparedRun run;
   run.name = "planned";
+  run.recorded = false;
   run.experiment = planned.experiment;
   run.interval = 0.5 * range.row_spacing;
   run.day_offset = range.day_offset;

@@ -70,7 +70,8 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "creep" && at == 1) return {1, 4, 15, 60, 250};
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
   if (id == "series_elasticity" && at == 1) return {5, 7, 10, 14, 20, 28, 40};
-  if (id == "series_elasticity" && at == 2) return {0.05};
+  if (id == "series_elasticity_within" && at == 1) return {7, 10, 14, 20, 28};
+  if (one_of(id, {"series_elasticity", "series_elasticity_within"}) && at == 2) return {0.05};
   if (one_of(id, {"backlash", "backlash_of_wheel"}) && at == 0) return {0.003, 0.015};
   if (id == "encoder_play" && at == 0) return {0.001, 0.004};
   if (id == "tension_loss" && at == 1) {

@@ -98,6 +98,11 @@ class Kernel {
   std::vector<double> weights_;
 };
 
+/// Effects are driven by signals that one Gaussian has passed; rows of the motion have passed a wider one: σ² add up.
+double left_to_smooth(const Smoothing& smoothing) {
+  return std::sqrt(std::max(0.0, smoothing.motion * smoothing.motion - smoothing.torque * smoothing.torque));
+}
+
 bool reads_force(const ModelPoint& model) {
   return std::any_of(model.effects.begin(), model.effects.end(),
                      [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
@@ -160,7 +165,7 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
         for (std::size_t k = 0; k < change.size(); ++k) extra[k] += change[k];
       }
     }
-    const Kernel kernel(data_->smoothing.motion / run.interval);
+    const Kernel kernel(left_to_smooth(data_->smoothing) / run.interval);
     for_rows(Chain::kMotion, [&](std::size_t k) {
       return inertia * (*in.slow_acceleration)[k] + (extra.empty() ? 0.0 : kernel(extra, k));
     });
@@ -194,7 +199,8 @@ void Predictor::predict_addition(const ModelPoint& model, const Active& effect, 
       const std::vector<double> torque = torque_of_effects(alone, run, *in, motion);
       if (torque.empty()) continue;
       const double sign = motion ? -1.0 : 1.0;
-      const Kernel kernel((motion ? data_->smoothing.motion : data_->smoothing.torque) / run.interval);
+      const Kernel kernel((motion ? left_to_smooth(data_->smoothing) : data_->smoothing.torque) /
+                          run.interval);
       for (std::size_t i = begin; i < end; ++i)
         if (data_->rows[i].chain == chain)
           out[static_cast<Eigen::Index>(i)] = sign * kernel(torque, data_->rows[i].sample);
@@ -231,7 +237,9 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
     }
   }
   if (run.is_free && !run.slow_acceleration.empty() && std::isfinite(data_->rig.inertia)) {
-    const std::vector<double> extra = torque_of_effects(model, run, in, true);
+    std::vector<double> extra = torque_of_effects(model, run, in, true);
+    if (!extra.empty())  // as φ̈ is, and what both are held against
+      extra = low_pass(extra, left_to_smooth(data_->smoothing) / run.interval);
     rate.motion.resize(run.time.size());
     for (std::size_t k = 0; k < rate.motion.size(); ++k)
       rate.motion[k] = data_->rig.inertia * (*in.slow_acceleration)[k] - (extra.empty() ? 0.0 : extra[k]);

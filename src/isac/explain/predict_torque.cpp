@@ -1,7 +1,9 @@
 // The torque of effects along the measured motion, and what sensors of the force make of it.
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
+#include "isac/core/units.hpp"
 #include "isac/explain/predict_parts.hpp"
 
 namespace isac::explain {
@@ -9,6 +11,11 @@ namespace {
 
 using models::Hook;
 using models::JointPoint;
+
+constexpr double kEdge = 5;          // standard deviations of the kernel that a run's first row reaches into
+constexpr double kRing = 1.5;        // s, of the beginning
+constexpr double kAtStart = 0.05;    // rad: what hangs on a compliance may be this far off at the beginning
+constexpr double kRingNoise = 0.02;  // N m, of a sample
 
 /// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
 /// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
@@ -71,6 +78,42 @@ class Memory {
   double z_[models::kMaxEffectStates] = {};
 };
 
+/// Where what hangs on a compliance stood when a recording began is not known, and it rings from there: c e^{λt}, λ = W (−d ± i √(1 − d²)),
+/// is fitted to what is left of the motion in the run's first moments, and added. (Parameters: J2, f, d.)
+void add_ring(const PreparedRun& run, const Values& q, double inertia, double sigma,
+              const std::vector<double>& acceleration, double sign, std::vector<double>& extra) {
+  if (!run.recorded || run.smooth_torque.empty() || !(q[2] < 0.99) || !(q[0] > 0)) return;
+  using Complex = std::complex<double>;
+  const double w = 2 * kPi * q[1];
+  const Complex root = w * Complex(-q[2], std::sqrt(1 - q[2] * q[2]));
+  const Complex smoothed = std::exp(0.5 * root * root * sigma * sigma);  // what the kernel leaves of it
+  const auto from = static_cast<std::size_t>(kEdge * sigma / run.interval);
+  const auto to = std::min(extra.size(), from + static_cast<std::size_t>(kRing / run.interval));
+  double rr = 0, ri = 0, ii = 0, re = 0, ie = 0;
+  for (std::size_t k = from; k < to; ++k) {
+    if (run.usable[k] == 0) continue;
+    const double off = inertia * acceleration[k] - sign * extra[k] - run.smooth_torque[k];
+    const Complex ring = smoothed * std::exp(root * (run.interval * static_cast<double>(k)));
+    rr += ring.real() * ring.real();
+    ri += ring.real() * ring.imag();
+    ii += ring.imag() * ring.imag();
+    re += ring.real() * off;
+    ie += ring.imag() * off;
+  }
+  // Known beforehand to be small, and nothing where there is no second inertia.
+  const double most = q[0] * w * w * kAtStart, ridge = kRingNoise * kRingNoise / (most * most);
+  rr += ridge;
+  ii += ridge;
+  const double determinant = rr * ii - ri * ri;
+  if (!(determinant > 0)) return;
+  const double a = (ii * re - ri * ie) / determinant, b = (rr * ie - ri * re) / determinant;
+  for (std::size_t k = 0; k < extra.size(); ++k) {
+    const Complex ring = std::exp(root * (run.interval * static_cast<double>(k)));
+    if (std::norm(ring) < 1e-12) break;
+    extra[k] += sign * (a * ring.real() + b * ring.imag());
+  }
+}
+
 }  // namespace
 
 double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const {
@@ -99,10 +142,9 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
                                .cubic_damping = term(cubic_damping_),
                                .damping = term(damping_)};
     const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
-    const std::vector<double>& acceleration = motion ? *in.slow_acceleration : *in.acceleration;
     const auto at = [&](std::size_t k) {
-      return point_at(data_->rig, base, *in.angle, velocity, acceleration, in.pressure, time_of(h, run, k),
-                      k);
+      return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure,
+                      time_of(h, run, k), k);
     };
     JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {
@@ -118,6 +160,8 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
       x = next;
       sum[k] += sign * models::effect_torque(h.effect, a.values.data(), x, memory.state());
     }
+    if (motion && h.info().state_count == 2)
+      add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration, sign, sum);
   }
   return sum;
 }

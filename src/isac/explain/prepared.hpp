@@ -45,6 +45,7 @@ inline constexpr int kChains = 4;
 inline constexpr double kAtomSeconds = 2.0;  ///< the shortest block
 
 struct PreparedRun {
+  bool recorded = true;  ///< false: planned, its signals are a model's
   std::string name, experiment, sha256;
   double interval = 0;    ///< s
   double day_offset = 0;  ///< s from the first run's start to this one's

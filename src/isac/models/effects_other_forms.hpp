@@ -7,6 +7,7 @@
 ///   crosstalk_direct      either muscle's pressure moves the other's at once, without the valve's lag
 ///   valve_stiction        the valve does not answer errors below its band, and answers larger ones in full
 ///   pressure_creep        the force follows a change of pressure late (bladder): a torque with a slow state of Δp
+///   series_elasticity_within  the second inertia is part of the one that is known, not besides it
 ///   maxwell_slip          one elasto-plastic element: a spring that slips at T_h, with corners instead of Dahl's curve
 ///
 /// Conventions, units and promises as in effects_torque.hpp and effects_pcu.hpp. Source: docs/derivations/effects.md.
@@ -15,6 +16,7 @@
 #include <cmath>
 
 #include "isac/models/effect_types.hpp"
+#include "isac/models/effects_memory.hpp"
 #include "isac/models/scalar.hpp"
 
 namespace isac::models::effect {
@@ -223,6 +225,37 @@ struct LeverArmInLaw {
 };
 
 /// The muscles' damping sits on the wheel too: while the joint crosses the play, the wheel stands and nothing is damped.
+struct SeriesElasticityWithin {
+  static constexpr EffectInfo kInfo{
+      .id = "series_elasticity_within",
+      .term = "compliance within the inertia that is known",
+      .where = Subsystem::kJoint,
+      .equation = "-J2 (s - phi''), s = W^2 (phi - z1) + 2 d W (w - z2), z1' = z2, z2' = s, W = 2 pi f",
+      .parameter_count = 3,
+      .parameters = {{"J2", "kg m2", 1, 0, 1e3, 0.001},
+                     {"f", "Hz", 1, 1, 500, 20, kAnyValue},
+                     {"d", "-", 1, 0, 2, 0.05, kAnyValue}},
+      .state_count = 2,
+      .torque_term = true,
+      .linear = false,
+      .confused_with = "sensor_lag, inertia_error, dead_time",
+      .told_apart_by = "a pair of anti-resonance and resonance, not a pure lag",
+      .dissipative = true,
+      .reported_as = "series_elasticity"};
+  template <class S>
+  static S torque(const S* q, const JointPoint<S>& x, const S* z) noexcept {
+    return -(q[0] * (SeriesElasticity::pull(q, x, z) - x.acceleration));
+  }
+  template <class S>
+  static void derivative(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    SeriesElasticity::derivative(q, x, z, dz);
+  }
+  template <class S>
+  static void rest(const S* q, const JointPoint<S>& x, S* z) noexcept {
+    SeriesElasticity::rest(q, x, z);
+  }
+};
+
 struct BacklashOfWheel {
   static constexpr EffectInfo kInfo{
       .id = "backlash_of_wheel",
@@ -255,7 +288,8 @@ struct BacklashOfWheel {
   }
 };
 
-using OtherForms = EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction,
-                              PressureCreep, MaxwellSlip, SupplySag, LeverArmInLaw, BacklashOfWheel>;
+using OtherForms =
+    EffectList<LeakPerMuscle, CrosstalkPerMuscle, CrosstalkDirect, ValveStiction, PressureCreep, MaxwellSlip,
+               SupplySag, LeverArmInLaw, SeriesElasticityWithin, BacklashOfWheel>;
 
 }  // namespace isac::models::effect
