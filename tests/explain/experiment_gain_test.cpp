@@ -26,8 +26,8 @@ TEST(NextExperiment, needs_at_most_a_third_of_the_seconds_that_random_runs_need)
   const Bench constant(TiedRig{}, test::constant_mean_pressure());
   const Bench slow(TiedRig{}, test::slow_pressures());
   const Pair pairs[] = {{"pressure_dependent_friction", "coulomb_friction", false},
-                        {"dead_time", "second_order_lag", true},
-                        {"valve_deadband", "valve_hysteresis", true},
+                        {"lever_arm_variation", "encoder_gain", false},
+                        {"crosstalk", "pressure_gain_error", false},
                         {"asymmetric_fill_vent", "flow_limit", true},
                         {"stribeck_friction", "coulomb_friction", false},
                         {"volume_coupling", "second_order_lag", false},

@@ -60,6 +60,18 @@ double correlation(const Prepared& data, const Eigen::VectorXd& x, std::size_t l
   return product / squares;
 }
 
+TEST(Colour, is_the_same_where_a_chain_begins_with_a_gap) {
+  const Prepared data = rows_of_runs(6, 4000);
+  Prepared late = data;
+  for (std::size_t i = 1; late.rows[i].run == 0; ++i) late.rows[i].sample += 4;
+  const Eigen::VectorXd rows = noise(data, 1.0, 4.0, 0.2, 0, 2);
+  const Colour before = colour_of(data, rows, Chain::kTorque), after = colour_of(late, rows, Chain::kTorque);
+  EXPECT_GT(before.slow, 2);
+  EXPECT_NEAR(after.slow, before.slow, 0.05 * before.slow);
+  EXPECT_NEAR(after.memory, before.memory, 0.05 * before.memory);
+  EXPECT_NEAR(after.white, before.white, 0.05 * before.white);
+}
+
 TEST(Colour, is_gone_from_what_the_filter_leaves_and_comes_back_without_it) {
   const Prepared data = rows_of_runs(6, 4000);
   const Eigen::VectorXd before = noise(data, 1.0, 4.0, 0.2, 3.0, 1);
@@ -177,6 +189,27 @@ TEST(QuietPressure, leaves_readings_alone_without_commands) {
   const std::vector<double> before = data.runs[0].pressure[0];
   const QuietPressure quiet = QuietPressure::learn(data);
   EXPECT_EQ(before, data.runs[0].pressure[0]);
+}
+
+TEST(QuietPressure, moves_no_pressure_where_the_valve_is_its_lag) {
+  // A reading is low-passed; held against a prediction that is not, σ²/(2 T²) = 6e-4 of what is still to come would be left.
+  test::TiedRig rig;
+  rig.pressure_noise = 0.0005 * kPascalPerKgfCm2;
+  rig.force_noise = 3;  // the torque says nothing, so rules say all
+  Prepared data =
+      prepare(test::record_all(rig, {test::clamped(40, 0.1, 1.0, 8), test::clamped(40, -0.1, 1.0, 2, "steps"),
+                                     test::by_hand(40, 0.3, 1.0)}),
+              rig.facts(), {}, 4.0);
+  (void)QuietPressure::learn(data);
+  double product = 0, squares = 0;
+  for (const PreparedRun& run : data.runs)
+    for (int i = 0; i < 2; ++i)
+      for (std::size_t k = 500; k + 100 < run.time.size(); ++k) {
+        const double ahead = run.command[i][k] - run.smooth_pressure[i][k];
+        product += ahead * (run.pressure[i][k] - run.smooth_pressure[i][k]);
+        squares += ahead * ahead;
+      }
+  EXPECT_LT(std::abs(product / squares), 1e-4);
 }
 
 }  // namespace

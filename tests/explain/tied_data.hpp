@@ -3,6 +3,7 @@
 /// at 10 kHz, sensors with noise and encoder steps. For tests that record what isac-explain asks for.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -19,10 +20,12 @@ namespace isac::test {
 /// Truth in SI; effects are absent at nothing.
 struct TiedRig {
   double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
-  double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 90;  // N at p0
-  double dry = 0, load_exponent = 0;                                   // N m, and its power of p_mean/p0
+  double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 120;  // N at p0: both muscles stay taut
+  double dry = 0, load_exponent = 0;                                    // N m, and its power of p_mean/p0
   double offset = 0, asymmetry = 0;      // N m at p0 whatever the pressure, and in proportion to it
   double dead_time = 0, second_lag = 0;  // s
+  double encoder_play = 0;               // rad, half of it, between joint and encoder
+  double far_inertia = 0, far_hertz = 15, far_damping = 0.05;  // kg m2 of the inertia, behind a compliance
   double force_noise = 0.3, pressure_noise = 0.004 * kPascalPerKgfCm2;
 
   [[nodiscard]] explain::RigFacts facts() const {
@@ -69,6 +72,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     const double difference = run.delta_pressure_kgcm2 * kPascalPerKgfCm2 + (both ? 0.0 : s);
     return mean + (both ? s : 0.0) + (i == 0 ? -difference : difference);
   };
+  // A card holds what it was given until the next sample.
+  const auto held = [](double t) { return kStep * kPerSample * std::floor(t / (kStep * kPerSample) + 1e-6); };
   double q[2], p[2];
   for (int i = 0; i < 2; ++i) p[i] = rig.K_C * (q[i] = command(-1, i));
   const double stiffness = rig.A * rig.radius * rig.radius;
@@ -84,7 +89,7 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     steepest += share[i] * tone[i];
   }
   const double omega = hand ? run.peak_speed_rad_s / (run.amplitude_rad * steepest) : 0;
-  double angle = middle, velocity = 0;
+  double angle = middle, velocity = 0, shaft = middle, far_angle = middle, far_velocity = 0;
   const auto torque = [&](double w) {
     const double dp = 0.5 * (p[1] - p[0]), pm = 0.5 * (p[0] + p[1]);
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
@@ -113,10 +118,11 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
         velocity += run.amplitude_rad * share[i] * omega * tone[i] * std::cos(omega * tone[i] * t + phase[i]);
       }
     }
+    shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
     if (k % kPerSample == 0 && k < samples * kPerSample) {
       const double T = torque(velocity), common = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
       const double row[8] = {t,
-                             encoder * std::round(angle / encoder),
+                             encoder * std::round(shaft / encoder),
                              p[0] + rig.pressure_noise * gauss(random),
                              p[1] + rig.pressure_noise * gauss(random),
                              command(t, 0),
@@ -126,7 +132,7 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       for (std::size_t c = 0; c < 8; ++c) out.columns[c].values.push_back(row[c]);
     }
     for (int i = 0; i < 2; ++i) {
-      const double u = command(t - rig.dead_time, i);
+      const double u = command(held(t - rig.dead_time), i);
       if (rig.second_lag > 0) {
         q[i] += kStep / rig.second_lag * (u - q[i]);
       } else {
@@ -134,10 +140,19 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       }
       p[i] += kStep / rig.T_C * (rig.K_C * q[i] - p[i]);
     }
+    double near_inertia = rig.inertia, pulled = 0;
+    if (free && rig.far_inertia > 0) {
+      const double w = 6.283185307179586 * rig.far_hertz;
+      near_inertia -= rig.far_inertia;
+      pulled = rig.far_inertia *
+               (w * w * (angle - far_angle) + 2 * rig.far_damping * w * (velocity - far_velocity));
+      far_velocity += kStep * pulled / rig.far_inertia;
+      far_angle += kStep * far_velocity;
+    }
     if (free) {  // dry friction holds the joint where no torque overcomes it
       const double push = torque(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
       const bool held = velocity == 0 && push * torque(0) <= 0;
-      const double next = held ? 0 : velocity + kStep * push / rig.inertia;
+      const double next = held ? 0 : velocity + kStep * (push - pulled) / near_inertia;
       velocity = velocity * next < 0 ? 0 : next;
       angle += kStep * velocity;
     }

@@ -12,11 +12,13 @@ namespace {
 constexpr double kTaut = 5;            // N that keep a muscle and its sensor taut
 constexpr double kOfAngleLimit = 0.9;  // a planned motion stays this far inside
 
-/// rad either way of rest that leave both muscles taut at a mean pressure; a tenth is kept for what moves besides.
-double taut_amplitude(const RigRange& range, const RigFacts& rig, double mean_pressure) {
+/// rad either way of rest that leave both muscles taut and both force sensors within their range, between two mean pressures; a tenth is
+/// kept for what moves besides.
+double bearable_amplitude(const RigRange& range, const RigFacts& rig, double lowest, double highest) {
   constexpr double kShare = 0.9, kLeast = 0.02;  // rad: an encoder sees no less
   if (!(range.common_force > 0) || !(range.stiffness > 0)) return range.angle;
-  const double spare = range.common_force * mean_pressure - range.least_force;
+  const double spare = std::min(range.common_force * lowest - range.least_force,
+                                range.force_limit - range.common_force * highest);
   return std::max(kLeast, kShare * 2 * rig.wheel_radius * spare / range.stiffness);
 }
 
@@ -72,9 +74,10 @@ RigRange range_of(const Predictor& predictor, const ModelPoint& model,
 std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& rig) {
   constexpr double kPlain = 20, kLong = 60;  // s
   const double p0 = rig.initial_pressure / kPascalPerKgfCm2, far = 0.85 * range.angle;
-  // From where the torque is nothing, at the lowest mean pressure of the run.
-  const auto within = [&](double amplitude, double lowest_kgcm2) {
-    return std::min(amplitude, taut_amplitude(range, rig, lowest_kgcm2 * kPascalPerKgfCm2));
+  // From where the torque is nothing, the mean pressure moving by `swing` either way.
+  const auto within = [&](double amplitude, double mean_kgcm2, double swing_kgcm2 = 0) {
+    return std::min(amplitude, bearable_amplitude(range, rig, (mean_kgcm2 - swing_kgcm2) * kPascalPerKgfCm2,
+                                                  (mean_kgcm2 + swing_kgcm2) * kPascalPerKgfCm2));
   };
   std::vector<PlannedRun> runs;
   const auto add = [&](PlannedRun run) {
@@ -114,7 +117,7 @@ std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& ri
       add({.experiment = "constant-pressure",
            .seconds = kPlain,
            .mean_pressure_kgcm2 = p0,
-           .amplitude_rad = within(far, 0.65 * p0),
+           .amplitude_rad = within(far, p0, 0.35 * p0),
            .peak_speed_rad_s = speed,
            .pressure_swing_kgcm2 = 0.35 * p0,
            .pressure_period_s = 10,
@@ -176,7 +179,7 @@ std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& ri
       add({.experiment = experiment,
            .seconds = kLong,
            .mean_pressure_kgcm2 = p0,
-           .amplitude_rad = within(far, p0 - 0.8),
+           .amplitude_rad = within(far, p0, 0.8),
            .middle_rad = std::string_view(experiment) == "constant-angle" ? 0.5 * far : kNotKnown,
            .peak_speed_rad_s = 0.4,
            .pressure_swing_kgcm2 = 0.8,

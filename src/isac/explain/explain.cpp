@@ -185,10 +185,13 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
   fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
-  // A model that does worse on what it has not seen is not an explanation.
+  // A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what
+  // anyone would have fitted.
+  constexpr double kWorse = 1.002;
   if (!e.effects.empty() && proof.runs() > 0 &&
-      proof.residual(found.model.model, chain).rms() >
-          1.002 * proof.residual(found.baseline.model, chain).rms())
+      (proof.residual(found.model.model, chain).rms() >
+           kWorse * proof.residual(found.baseline.model, chain).rms() ||
+       e.gap.heldout_after > kWorse * e.gap.heldout_before))
     e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
   if (options.next_experiment && e.verdict != Verdict::kUnknown)

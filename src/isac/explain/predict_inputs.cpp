@@ -60,7 +60,8 @@ double lagrange(const double* t, const double* y, int n, double at) {
 
 /// A reading with play stands half the play behind the motion. Between the last count one way and the first one back the reading
 /// stands, and the joint goes on, turns and crosses the play: it passed the same edge of the encoder's step at both counts, half the play on
-/// either side, and the edge before at the counts before and after. A polynomial through these four says where it was between.
+/// either side, and the edge before at the counts before and after. A polynomial through these four says where it was between; what it
+/// says without play is taken off again, for an encoder without play is no better read for it.
 void undo_play(double step, double half, std::vector<double>& angle) {
   const std::vector<Count> counts = counts_of(angle, step);
   if (counts.empty()) return;
@@ -75,19 +76,23 @@ void undo_play(double step, double half, std::vector<double>& angle) {
       continue;
     }
     const auto time = [&](std::size_t c) { return static_cast<double>(counts[c].sample) - 0.5; };
-    double t[4] = {time(i), time(i + 1)}, y[4] = {half, -half};
+    double t[4] = {time(i), time(i + 1)}, with[4] = {half, -half}, without[4] = {0, 0};
     int n = 2;
     if (i > 0 && counts[i - 1].way == count.way && count.steps < 1.5) {
       t[n] = time(i - 1);
-      y[n++] = half - step;
+      without[n] = -step;
+      with[n++] = half - step;
     }
     if (i + 2 < counts.size() && counts[i + 2].way != count.way && counts[i + 1].steps < 1.5) {
       t[n] = time(i + 2);
-      y[n++] = -half - step;
+      without[n] = -step;
+      with[n++] = -half - step;
     }
-    const double edge = angle[count.sample] - 0.5 * step * count.way;
-    for (std::size_t k = count.sample; k < end; ++k)
-      angle[k] = edge + count.way * std::clamp(lagrange(t, y, n, static_cast<double>(k)), -half, half + step);
+    for (std::size_t k = count.sample; k < end; ++k) {
+      const auto at = static_cast<double>(k);
+      angle[k] += count.way * (std::clamp(lagrange(t, with, n, at), -half, half + step) -
+                               std::clamp(lagrange(t, without, n, at), 0.0, step));
+    }
   }
 }
 
@@ -220,10 +225,13 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
     in.own_velocity.resize(angle_at.size());
     in.own_acceleration.resize(angle_at.size());
     in.own_dry.resize(angle_at.size());
+    // A damping feels the shift by −D δ φ̈, in which the encoder's noise is the second derivative of what A r² φ leaves in the residual: the
+    // fit would pay for less of it with a skew that is not there. Only the slow part of the velocity is moved.
+    const std::vector<double> slowly = wide_low_pass(velocity_at, data_->smoothing.motion / dt);
     for (std::size_t k = 0; k < angle_at.size(); ++k) {
       const double at = static_cast<double>(k) + shift;
       in.own_angle[k] = between(angle_at, velocity_at, at, dt);
-      in.own_velocity[k] = between(velocity_at, acceleration_at, at, dt);
+      in.own_velocity[k] = velocity_at[k] + linear_between(slowly, at) - slowly[k];
       in.own_acceleration[k] = linear_between(acceleration_at, at);
       in.own_dry[k] = linear_between(dry_at, at);
     }
