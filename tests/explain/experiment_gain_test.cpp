@@ -30,7 +30,7 @@ TEST(NextExperiment, needs_at_most_a_third_of_the_seconds_that_random_runs_need)
                         {"crosstalk", "pressure_gain_error", false},
                         {"asymmetric_fill_vent", "flow_limit", true},
                         {"stribeck_friction", "coulomb_friction", false},
-                        {"volume_coupling", "second_order_lag", false},
+                        {"pressure_dependent_friction", "pressure_dependent_damping", false},
                         {"thermal_drift", "force_drift", false}};
   double ours_sum = 0, random_sum = 0, log_ratio = 0;
   int counted = 0;

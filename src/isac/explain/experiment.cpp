@@ -11,6 +11,7 @@
 namespace isac::explain {
 namespace {
 
+constexpr int kMostRuns = 3;
 constexpr double kRestPrior = 3;       // of a half step of the encoder, uniform
 constexpr double kTolerancePrior = 3;  // of half of what is tolerated, uniform
 constexpr double kUniform = 12;        // range² over variance
@@ -357,7 +358,7 @@ NextExperiment Designer::design() const {
   if (rivals.empty()) return give_up(twins.front());
 
   Information sum = recorded_;
-  for (int count = 0; count < 2; ++count) {
+  for (int count = 0; count < kMostRuns; ++count) {
     const double already = smallest(sum, rivals);
     Choice best;
     best.score = -2 * kNothing;

@@ -11,7 +11,7 @@
 /// refitted, b true and a refitted) and the smaller one is taken; of two models of which one is a special case of the other
 /// the general one is taken as true, since it mimics the special one always.
 /// Of about 150 possible runs (experiment_runs.hpp) the one with the largest smallest separation is taken, improved by a
-/// search over its numbers, and cut or stretched to the seconds it needs; a second one is added if one is not enough. Where no
+/// search over its numbers, and cut or stretched to the seconds it needs; a second and a third are added if one is not enough. Where no
 /// run reaches `least`, the answer is what to change at the rig.
 ///
 /// Units: sigma; plans as PlannedRun says. Threads: uses `threads`; the result does not depend on their number. Errors: none.
@@ -34,7 +34,7 @@ struct ExperimentOptions {
   int threads = 2;
   double wanted =
       7;  ///< sigma that a plan is given time for: a rival 7 sigma away is ruled out 19 times in 20
-  double enough = 5;    ///< below it a second run is added
+  double enough = 5;    ///< below it another run is added
   double least = 3;     ///< below it no run is worth asking for
   double longest = 60;  ///< s of one run
 };
