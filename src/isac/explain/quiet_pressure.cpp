@@ -147,7 +147,8 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
         const Predictor::FullRate rate = predictor.full_rate(quiet.model_, r);
         const Rules rules(run, rate.pressure, lag, i);
         // Low-passed as the reading is: of a first-order lag, a Gaussian makes σ²/(2 T²) of what is still to come.
-        const std::vector<double> predicted = low_pass(rate.pressure[i], data.smoothing.torque / run.interval);
+        const std::vector<double> predicted =
+            low_pass(rate.pressure[i], data.smoothing.torque / run.interval);
         for (std::size_t k = 0; k < run.time.size(); k += kStride)
           if (run.usable[k] != 0 && run.time[k] > kSettled) {
             rows.push_back(rules.at(k));
