@@ -156,7 +156,7 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
     if (reads_force(model)) {
       std::vector<double> torque(run.time.size());
       for (std::size_t k = 0; k < torque.size(); ++k)
-        torque[k] = inertia * (*in.slow_acceleration)[k] + (extra.empty() ? 0.0 : extra[k]);
+        torque[k] = inertia * (*in.acceleration)[k] + (extra.empty() ? 0.0 : extra[k]);
       std::vector<double> change(torque.size(), 0.0);
       read_forces(model, run, torque, change);
       if (extra.empty()) {
