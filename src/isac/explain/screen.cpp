@@ -84,6 +84,7 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
 
 /// p-value of a score whose own part is taken out of its scatter: t = Σ g / √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n.
 double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, double carried_by) {
+  if (!(carried_by > 2)) return 1;  // no freedom is left
   const double all = norm2.sum(), amplitude = score.sum() / all;
   const Eigen::ArrayXd left = (score - amplitude * norm2).array() / (1 - (norm2.array() / all).min(0.99));
   const double scatter = std::sqrt(left.square().sum());

@@ -224,7 +224,7 @@ struct LeverArmInLaw {
   }
 };
 
-/// The muscles' damping sits on the wheel too: while the joint crosses the play, the wheel stands and nothing is damped.
+/// Where the inertia was weighed whole: (I - J2) phi'' + J2 z'' = T.
 struct SeriesElasticityWithin {
   static constexpr EffectInfo kInfo{
       .id = "series_elasticity_within",
@@ -256,6 +256,7 @@ struct SeriesElasticityWithin {
   }
 };
 
+/// The muscles' damping sits on the wheel too: while the joint crosses the play, the wheel stands and nothing is damped.
 struct BacklashOfWheel {
   static constexpr EffectInfo kInfo{
       .id = "backlash_of_wheel",
