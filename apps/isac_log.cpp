@@ -181,7 +181,7 @@ class Console : public runtime::SessionObserver {
     std::fflush(out_);
   }
 
-  void progress(const series::Program& program, const runtime::Live& live) override {
+  void progress(const series::Program& program, const runtime::RecordingLive& live) override {
     if (terminal_) {
       fmt::print(out_, "\r\033[K  {}", runtime::progress_line(program, live, columns() - 3));
       std::fflush(out_);

@@ -12,7 +12,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using explain::Candidate;
 
-Json text_or_null(const std::string& text) {
+Json words_or_null(const std::string& text) {
   return text.empty() ? Json(nullptr) : Json(text);
 }
 
@@ -30,7 +30,7 @@ Json disagreement_of(const explain::Explanation& e) {
                        {"rmse", json_number(gap.rmse)},
                        {"after", json_number(gap.after)},
                        {"noise_floor", json_number(gap.noise_floor)},
-                       {"noise_floor_from", text_or_null(gap.floor_from)},
+                       {"noise_floor_from", words_or_null(gap.floor_from)},
                        {"p_value", json_number(gap.p_value)}});
   }
   for (const explain::Region& region : e.where) {
@@ -53,7 +53,7 @@ Json candidate_of(const Candidate& candidate) {
           {"form", candidate.form.empty() ? candidate.id : candidate.form},
           {"name", candidate.name},
           {"subsystem", candidate.subsystem},
-          {"equation", text_or_null(candidate.equation)},
+          {"equation", words_or_null(candidate.equation)},
           {"confidence", json_number(candidate.confidence)},
           {"behind_best_sigma", json_number(candidate.behind_best)},
           {"closes", json_number(candidate.closes)},
@@ -116,7 +116,7 @@ std::string format_explanation(const explain::Explanation& e, const std::vector<
   extra["unknown"] = unknown_of(e);
   extra["not_testable"] = e.not_testable;
   extra["could_hide"] = could_hide_of(e);
-  extra["next_experiment"] = e.next_experiment ? text_or_null(e.next_experiment->sentence) : Json(nullptr);
+  extra["next_experiment"] = e.next_experiment ? words_or_null(e.next_experiment->sentence) : Json(nullptr);
   extra["separation"] = nullptr;
   if (e.next_experiment && !e.next_experiment->separates_a.empty()) {
     extra["separation"] = {{"between", {e.next_experiment->separates_a, e.next_experiment->separates_b}},

@@ -31,7 +31,7 @@ namespace {
 
 constexpr const char* kSensors[] = {"p1", "p2"};
 
-struct Call {
+struct CalibrateCall {
   std::vector<std::string> files, levels, maps;
   std::string rig, output, report;
 };
@@ -288,7 +288,7 @@ Estimated in_kgf(Estimated value) {
   return value;
 }
 
-int run_calibrate(const Call& call, const std::string& json_path) {
+int run_calibrate(const CalibrateCall& call, const std::string& json_path) {
   for (const std::string& path : {call.output, call.report, json_path}) require_writable(path);
   const Files files = find_files(call.files, {}, call.rig);
   record::Rig rig;
@@ -373,7 +373,7 @@ int run_calibrate(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_calibrate(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<CalibrateCall>();
   CLI::App* sub =
       program.add_subcommand("calibrate", "offsets and gains of sensors and valves, encoder middle");
   sub->add_option("files", call->files,

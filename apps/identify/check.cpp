@@ -22,7 +22,7 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct CheckCall {
   std::vector<std::string> files, maps;
   std::string report;
   bool without_time = false;
@@ -65,7 +65,7 @@ void print(const series::Recording& recording, const series::RecordingSummary& s
   for (const Warning& remark : summary.remarks) fmt::print("  ! {}\n", remark.text);
 }
 
-int run_check(const Call& call, const std::string& json_path) {
+int run_check(const CheckCall& call, const std::string& json_path) {
   for (const std::string& path : {call.report, json_path}) require_writable(path);
   const Files files = find_files(call.files, {}, {});
   std::vector<std::filesystem::path> paths = files.runs;
@@ -109,7 +109,7 @@ int run_check(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_check(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<CheckCall>();
   CLI::App* sub = program.add_subcommand("check", "reads, validates and draws every signal");
   sub->add_option("files", call->files, "recordings (CSV) or dataset folders")->required();
   sub->add_option("--map", call->maps, "foreign column, e.g. angle=\"Joint Pos (deg)\":deg");

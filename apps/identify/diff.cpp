@@ -17,11 +17,11 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct DiffCall {
   std::string before, after;
 };
 
-int run_diff(const Call& call, const std::string& json_path) {
+int run_diff(const DiffCall& call, const std::string& json_path) {
   require_writable(json_path);
   const record::Params before = record::read_params(call.before);
   const record::Params after = record::read_params(call.after);
@@ -88,7 +88,7 @@ int run_diff(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_diff(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<DiffCall>();
   CLI::App* sub = program.add_subcommand("diff", "two params files: is the change significant?");
   sub->add_option("before", call->before, "params.toml")->required();
   sub->add_option("after", call->after, "params.toml")->required();

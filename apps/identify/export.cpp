@@ -26,12 +26,12 @@ namespace isac::apps {
 namespace {
 namespace fs = std::filesystem;
 
-struct Call {
+struct ExportCall {
   std::string input, folder = ".", stem = "isac_parameters";
   bool verify = false;
 };
 
-int verify(const Call& call, const std::string& json_path) {
+int verify(const ExportCall& call, const std::string& json_path) {
   std::ifstream file(call.input, std::ios::binary);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   if (!file && bytes.empty()) {
@@ -59,7 +59,7 @@ int verify(const Call& call, const std::string& json_path) {
   return 0;
 }
 
-int run_export(const Call& call, const std::string& json_path) {
+int run_export(const ExportCall& call, const std::string& json_path) {
   require_writable(json_path);
   if (call.verify) return verify(call, json_path);
   const record::Params params = record::read_params(call.input);
@@ -90,7 +90,7 @@ int run_export(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_export(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<ExportCall>();
   CLI::App* sub =
       program.add_subcommand("export", "deployment tables: C header, binary with CRC, CSV, Markdown");
   sub->add_option("params", call->input, "params.toml (with --verify: the packed binary)")->required();

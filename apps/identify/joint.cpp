@@ -31,7 +31,7 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct JointCall {
   std::vector<std::string> runs, heldout, maps;
   std::string rig, params, report, model, output, position = "angle", loss = "huber", differentiator;
   std::vector<std::string> terms;
@@ -180,7 +180,7 @@ void print_summary(const estimate::JointFit& fit, const std::string& unit) {
   print_warnings(fit.warnings);
 }
 
-int run_joint(const Call& call, const std::string& json_path) {
+int run_joint(const JointCall& call, const std::string& json_path) {
 #ifdef __GLIBC__
   // Columns come and go by the dozen: memory that was once given is kept, instead of page faults for each column anew.
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
@@ -311,7 +311,7 @@ int run_joint(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_joint(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<JointCall>();
   CLI::App* sub = program.add_subcommand("joint", "A, B, C, D of a joint, or any terms of the catalogue");
   sub->add_option("runs", call->runs, "recordings (CSV) or dataset folders")->required();
   sub->add_option("--rig", call->rig, "rig.toml; a dataset folder's own is found by itself");

@@ -35,7 +35,7 @@ constexpr double kMuscleShare =
 constexpr double kSpareAngle =
     9 * kPi / 180;  // rad, to the limits: isac-log approaches a pose from both sides
 
-struct Call : PoseWords {
+struct MassesCall : PoseWords {
   std::vector<std::string> unknowns;
   std::string params, report, plan, criterion = "A", limit = "2 kg/cm2";
   int design = 8;
@@ -162,7 +162,7 @@ void print_design(const estimate::PoseDesign& design, const estimate::MassArm& a
   }
 }
 
-void take_unknowns(const Call& call, estimate::MassFitOptions& options) {
+void take_unknowns(const MassesCall& call, estimate::MassFitOptions& options) {
   options.robust = !call.plain;
   for (const std::string& unknown : call.unknowns) {
     if (unknown == "load") {
@@ -175,7 +175,7 @@ void take_unknowns(const Call& call, estimate::MassFitOptions& options) {
   }
 }
 
-estimate::PoseDesignOptions design_options(const Call& call, const estimate::MassFitOptions& fit) {
+estimate::PoseDesignOptions design_options(const MassesCall& call, const estimate::MassFitOptions& fit) {
   estimate::PoseDesignOptions options;
   options.poses = call.design;
   options.criterion = call.criterion == "D" ? estimate::DesignCriterion::kD : estimate::DesignCriterion::kA;
@@ -211,7 +211,7 @@ void write_plan(const std::string& path, const estimate::PoseDesign& design, con
 }
 
 /// Poses for an arm of which nothing is recorded yet.
-int run_design(const Call& call, const Poses& input, const std::string& json_path) {
+int run_design(const MassesCall& call, const Poses& input, const std::string& json_path) {
   const estimate::PoseDesignOptions next = design_options(call, input.options);
   const estimate::PoseDesign design = estimate::design_poses(input.arm, next);
   write_plan(call.plan, design, input.file);
@@ -226,7 +226,7 @@ int run_design(const Call& call, const Poses& input, const std::string& json_pat
   return 0;
 }
 
-int run_masses(const Call& call, const std::string& json_path) {
+int run_masses(const MassesCall& call, const std::string& json_path) {
   for (const std::string& path : {call.params, call.report, call.plan, json_path}) require_writable(path);
   Poses input = read_poses(call, !call.params.empty());
   const record::ArmFile& file = input.file;
@@ -303,7 +303,7 @@ int run_masses(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_masses(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<MassesCall>();
   CLI::App* sub = program.add_subcommand("masses", "masses of an arm from poses, and the poses to hold next");
   sub->add_option("poses", call->runs,
                   "recordings (CSV), a row per pose: theta1… or phi1…, and tau1… or dp1…");

@@ -29,7 +29,7 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct MotionCall {
   std::vector<std::string> runs, maps, holds, starts;
   std::string rig, params, report, gravity;
   double friction_speed = 0.05, dead_time = 0;
@@ -76,7 +76,7 @@ estimate::MotionRun motion_run(const series::Recording& recording) {
   return run;
 }
 
-int run_motion(const Call& call, const std::string& json_path) {
+int run_motion(const MotionCall& call, const std::string& json_path) {
   for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
   estimate::MotionOptions options;
   for (const std::string& text : call.starts) set_parameter(text, false, options);
@@ -158,7 +158,7 @@ int run_motion(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_motion(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<MotionCall>();
   CLI::App* sub =
       program.add_subcommand("motion", "a free joint from command and angle alone, by output error");
   sub->add_option("runs", call->runs,

@@ -27,7 +27,7 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct MuscleCall {
   std::vector<std::string> runs, heldout, maps, models;
   std::string params, report, zero = "fitted", force_floor;
 };
@@ -42,7 +42,7 @@ double constant_of(const series::Recording& recording, const char* name) {
   return std::nan("");
 }
 
-estimate::MuscleRun muscle_run(const series::Recording& recording, const Call& call) {
+estimate::MuscleRun muscle_run(const series::Recording& recording, const MuscleCall& call) {
   estimate::MuscleRun run;
   run.name = short_name(recording.source);
   run.sha256 = recording.sha256;
@@ -88,7 +88,7 @@ void share_full_contraction(std::vector<estimate::MuscleRun>& runs,
   }
 }
 
-int run_muscle(const Call& call, const std::string& json_path) {
+int run_muscle(const MuscleCall& call, const std::string& json_path) {
   for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
   estimate::MuscleFitOptions options;
   options.models = call.models;
@@ -172,7 +172,7 @@ int run_muscle(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_muscle(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<MuscleCall>();
   CLI::App* sub =
       program.add_subcommand("muscle", "muscle models fitted to force, pressure and contraction, and ranked");
   sub->add_option("runs", call->runs,

@@ -25,14 +25,14 @@
 namespace isac::apps {
 namespace {
 
-struct Call {
+struct PcuCall {
   std::vector<std::string> runs, maps;
   std::string rig, params, report, step_size, label;
   double step_at = std::nan("");
 };
 
 /// A recording's channels: p1 and p2 with their commands, or one `pressure`.
-std::vector<estimate::PcuRun> channels_of(const series::Recording& recording, const Call& call) {
+std::vector<estimate::PcuRun> channels_of(const series::Recording& recording, const PcuCall& call) {
   std::vector<estimate::PcuRun> channels;
   for (const char* name : {"p1", "p2", "pressure"}) {
     const series::Column* pressure = recording.find(name);
@@ -82,7 +82,7 @@ nlohmann::ordered_json details_of(const estimate::PcuFit& fit) {
   return extra;
 }
 
-int run_pcu(const Call& call, const std::string& json_path) {
+int run_pcu(const PcuCall& call, const std::string& json_path) {
   for (const std::string& path : {call.params, call.report, json_path}) require_writable(path);
   const Files files = find_files(call.runs, {}, call.rig);
   const record::ReadOptions reading{
@@ -149,7 +149,7 @@ int run_pcu(const Call& call, const std::string& json_path) {
 }  // namespace
 
 Body add_pcu(CLI::App& program, std::string& json_path) {
-  auto call = std::make_shared<Call>();
+  auto call = std::make_shared<PcuCall>();
   CLI::App* sub = program.add_subcommand("pcu", "gain, lag and dead time of the valve unit from steps");
   sub->add_option("runs", call->runs, "recordings (CSV) or dataset folders with p1, p1_cmd, p2, p2_cmd")
       ->required();

@@ -17,6 +17,8 @@
 namespace isac::apps {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr double kFar = 2 * kPi / 180;  // rad from the planned angle, worth a word
 
 class Console final : public runtime::PoseObserver {
@@ -61,7 +63,6 @@ std::string card_of(const ArmPoseWords& words) {
 }
 
 std::string format_poses(const runtime::PoseSessionResult& result, const std::string& file, bool keep) {
-  using Json = nlohmann::ordered_json;
   Json poses = Json::array();
   for (const runtime::HeldPose& pose : result.rows)
     poses.push_back(

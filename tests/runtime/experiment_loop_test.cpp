@@ -60,7 +60,7 @@ class Loop : public testing::Test {
   std::unique_ptr<SignalMap> map_;
   LoopOptions options_;
   series::Program program_;
-  Live live_;
+  RecordingLive live_;
   std::atomic<bool> stop_{false};
 };
 

@@ -24,7 +24,7 @@ class Watcher : public SessionObserver {
     return begun <= most;
   }
   void prompt(const std::string& sentence) override { prompts.push_back(sentence); }
-  void progress(const series::Program&, const Live& live) override {
+  void progress(const series::Program&, const RecordingLive& live) override {
     EXPECT_GE(live.elapsed.load(), 0.0);
     if (stop_when_recording != nullptr && live.recording.load()) *stop_when_recording = true;
   }

@@ -10,7 +10,7 @@ namespace {
 TEST(Progress, shows_time_speed_pressure_and_force_and_fits_the_terminal) {
   series::Program program;
   program.duration = 40.0;
-  Live live;
+  RecordingLive live;
   live.recording = true;
   live.elapsed = 10.0;
   live.peak_speed = 0.314;
@@ -27,7 +27,7 @@ TEST(Progress, shows_time_speed_pressure_and_force_and_fits_the_terminal) {
 }
 
 TEST(Progress, says_that_it_gets_ready_before_the_first_sample) {
-  const Live live;
+  const RecordingLive live;
   EXPECT_EQ(progress_line({}, live, 80).rfind("getting ready", 0), 0u);
 }
 

@@ -10,7 +10,7 @@ namespace isac::card {
 
 namespace {
 
-constexpr std::int64_t kReadTimeNs = 1000;
+constexpr std::int64_t kSampleTimeNs = 1000;
 constexpr std::int64_t kVentGrainNs = 10'000'000;  // a vent from another thread acts within this
 constexpr std::size_t kValves = 2;
 
@@ -79,7 +79,7 @@ Status SimCard::read(Sample& sample) noexcept {
   sample.time_ns = stamp;
   sample.encoder[0] = codes.encoder;
   std::copy(codes.input.begin(), codes.input.end(), sample.input.begin());
-  now_ns_ += kReadTimeNs;
+  now_ns_ += kSampleTimeNs;
   return Status::kOk;
 }
 

@@ -12,7 +12,7 @@ namespace isac::estimate {
 namespace {
 
 using Kind = MassUnknown::Kind;
-constexpr double kLevel = 0.01;  // of a false alarm in the whole set of candidates
+constexpr double kSetLevel = 0.01;  // of a false alarm in the whole set of candidates
 constexpr double kDegree = 0.0174532925199433;
 
 struct Candidate {
@@ -102,7 +102,7 @@ void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values,
   const auto count = static_cast<double>(std::max<std::size_t>(all.size(), 1));
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (scores[i].p_value * count < kLevel) seen.push_back(i);
+    if (scores[i].p_value * count < kSetLevel) seen.push_back(i);
   std::sort(seen.begin(), seen.end(),
             [&](std::size_t a, std::size_t b) { return scores[a].p_value < scores[b].p_value; });
   if (!seen.empty()) {

@@ -9,17 +9,44 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kTaut = 5;            // N that keep a muscle and its sensor taut
-constexpr double kOfAngleLimit = 0.9;  // a planned motion stays this far inside
+constexpr double kTaut = 5;              // N that keep a muscle and its sensor taut
+constexpr double kPlannedOfLimit = 0.9;  // a planned motion stays this far inside
 
 /// rad either way of rest that leave both muscles taut and both force sensors within their range, between two mean pressures; a tenth is
-/// kept for what moves besides.
+/// kept for what moves besides. Negative where a muscle hangs slack at rest.
 double bearable_amplitude(const RigRange& range, const RigFacts& rig, double lowest, double highest) {
-  constexpr double kShare = 0.9, kLeast = 0.02;  // rad: an encoder sees no less
-  if (!(range.common_force > 0) || !(range.stiffness > 0)) return range.angle;
-  const double spare = std::min(range.common_force * lowest - range.least_force,
-                                range.force_limit - range.common_force * highest);
-  return std::max(kLeast, kShare * 2 * rig.wheel_radius * spare / range.stiffness);
+  constexpr double kShare = 0.9;
+  if (!(range.mean_force > 0) || !(range.stiffness > 0)) return range.angle;
+  const double spare = std::min(range.common_force(lowest) - range.least_force,
+                                range.force_limit - range.common_force(highest));
+  return kShare * 2 * rig.wheel_radius * spare / range.stiffness;
+}
+
+/// How the mean force of the muscles follows the mean pressure: as recorded where that varied, else as the model says of Δp, which is one
+/// muscle's pressure against the other's (B/2 for each).
+void find_forces(const Predictor& predictor, const ModelPoint& model, RigRange& range) {
+  constexpr double kVaried = 0.1 * kPascalPerKgfCm2;  // Pa, a standard deviation
+  double n = 0, p = 0, f = 0, pp = 0, pf = 0;
+  for (const PreparedRun& run : predictor.data().runs) {
+    if (run.force[0].empty() || !run.has_pressure) continue;
+    for (std::size_t k = 0; k < run.time.size(); ++k) {
+      const double pressure = 0.5 * (run.raw_pressure[0][k] + run.raw_pressure[1][k]),
+                   force = 0.5 * (run.force[0][k] + run.force[1][k]);
+      if (!std::isfinite(pressure) || !std::isfinite(force)) continue;
+      n += 1;
+      p += pressure;
+      f += force;
+      pp += pressure * pressure;
+      pf += pressure * force;
+    }
+  }
+  if (n == 0) return;
+  range.mean_pressure = p / n;
+  range.mean_force = f / n;
+  const double variance = pp / n - range.mean_pressure * range.mean_pressure;
+  range.force_slope = variance > kVaried * kVaried
+                          ? (pf / n - range.mean_pressure * range.mean_force) / variance
+                          : 0.5 * base_value(predictor, model, "B", 0.0);
 }
 
 }  // namespace
@@ -29,7 +56,7 @@ RigRange range_of(const Predictor& predictor, const ModelPoint& model,
   const Prepared& data = predictor.data();
   RigRange range;
   range.limits = limits;
-  double farthest = 0, fastest = 0, force = 0, force_sum = 0, pressure_sum = 0;
+  double farthest = 0, fastest = 0, force = 0;
   range.least_force = kTaut;
   bool driven = false, motion = false;
   for (const PreparedRun& run : data.runs) {
@@ -44,8 +71,6 @@ RigRange range_of(const Predictor& predictor, const ModelPoint& model,
     for (std::size_t k = 0; k < run.time.size(); ++k) {
       force = std::max({force, run.force[0][k], run.force[1][k]});
       range.least_force = std::min({range.least_force, run.force[0][k], run.force[1][k]});
-      force_sum += run.force[0][k] + run.force[1][k];
-      pressure_sum += run.raw_pressure[0][k] + run.raw_pressure[1][k];
     }
   }
   for (const Row& row : data.rows) {
@@ -56,9 +81,9 @@ RigRange range_of(const Predictor& predictor, const ModelPoint& model,
   range.free_torque = range.free_torque || !driven;
   range.day_offset += 60;
   range.moves_freely = std::isfinite(data.rig.inertia) && data.rig.inertia > 0;
-  range.angle = std::clamp(1.1 * farthest, 0.25, kOfAngleLimit * limits.angle_limit);
+  range.angle = std::clamp(1.1 * farthest, 0.25, kPlannedOfLimit * limits.angle_limit);
   range.speed = std::clamp(1.1 * fastest, 2.0, limits.speed_limit);
-  if (pressure_sum > 0) range.common_force = force_sum / pressure_sum;
+  find_forces(predictor, model, range);
   const double r = data.rig.wheel_radius;
   range.stiffness = std::max(0.0, -base_value(predictor, model, "A", 0.0) * r * r);
   range.force_limit = std::max(limits.force_limit, force);
@@ -81,6 +106,8 @@ std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& ri
   };
   std::vector<PlannedRun> runs;
   const auto add = [&](PlannedRun run) {
+    constexpr double kLeast = 0.02;  // rad: an encoder sees little of less
+    if (run.amplitude_rad < kLeast) return;
     run.seconds = std::max(run.seconds, std::min(kLong, least_seconds(run)));
     runs.push_back(run);
   };

@@ -170,7 +170,7 @@ bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run
     const double p1 = run.raw_pressure[0][k], p2 = run.raw_pressure[1][k];
     torque.move_to(run.angle[k], run.velocity[k], p1, p2, run.time[k]);
     const double half = 0.5 * torque.baseline(run.velocity[k]) / radius,
-                 common = range.common_force * 0.5 * (p1 + p2);
+                 common = range.common_force(0.5 * (p1 + p2));
     run.force[0][k] = common - half;
     run.force[1][k] = common + half;
     largest = std::max(largest, common + std::abs(half));
@@ -280,8 +280,10 @@ std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint
     run.angle.assign(
         n, planned.experiment == "pcu-step" || !std::isfinite(planned.middle_rad) ? 0.0 : planned.middle_rad);
   }
-  if (range.common_force > 0 && !pull(range, torque, before.rig.wheel_radius, run)) return std::nullopt;
+  if (range.mean_force > 0 && !pull(range, torque, before.rig.wheel_radius, run)) return std::nullopt;
   run.raw_angle = run.angle;
+  if (const double step = before.rig.angle_step; std::isfinite(step) && step > 0)
+    for (double& angle : run.raw_angle) angle = step * std::round(angle / step);
   run.dry_velocity = dry_velocity(run.raw_angle, run.velocity, run.interval, before.rig.angle_step);
   run.slow_acceleration = run.acceleration;
   run.torque.assign(n, 0.0);

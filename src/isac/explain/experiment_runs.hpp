@@ -12,6 +12,7 @@
 /// Source: seed 3.2 to 4.1; docs/derivations/experiment.md.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -27,7 +28,9 @@ struct RigRange {
   series::ExcitationOptions limits;
   double angle = 0.4;        ///< rad, farthest that a planned motion goes
   double speed = 6;          ///< rad/s
-  double common_force = 0;   ///< N/Pa, (F1 + F2)/2 over the mean pressure; 0 where forces are not known
+  double mean_force = 0;     ///< N, (F1 + F2)/2 at `mean_pressure`; 0 where forces are not known
+  double mean_pressure = 0;  ///< Pa, (p1 + p2)/2 of what has been recorded
+  double force_slope = 0;    ///< N/Pa, of the mean force with the mean pressure
   double stiffness = 0;      ///< N m/rad, −A r² of the model; 0 where there is none
   double force_limit = 200;  ///< N
   double least_force =
@@ -39,6 +42,11 @@ struct RigRange {
   double row_spacing = 0.008;  ///< s
   double free_row_noise =
       0;  ///< N m, of a row of the motion chain if none has been recorded: the encoder's steps
+
+  /// N, (F1 + F2)/2 at a mean pressure; nothing pushes.
+  [[nodiscard]] double common_force(double pressure) const noexcept {
+    return std::max(0.0, mean_force + force_slope * (pressure - mean_pressure));
+  }
 };
 
 [[nodiscard]] RigRange range_of(const Predictor& predictor, const ModelPoint& model,

@@ -70,8 +70,8 @@ double first_pressure(const std::vector<double>& pressure, const std::vector<dou
                       double interval) {
   constexpr double kLongest = 2.0, kShortest = 0.3, kLag = 0.17;  // s
   std::size_t n = 0;
-  while (n < pressure.size() && n * interval < kLongest && command[n] == command[0]) ++n;
-  if (n * interval < kShortest) return pressure.front();
+  while (n < pressure.size() && static_cast<double>(n) * interval < kLongest && command[n] == command[0]) ++n;
+  if (static_cast<double>(n) * interval < kShortest) return pressure.front();
   double s1 = 0, sg = 0, sgg = 0, sp = 0, sgp = 0, spp = 0;
   for (std::size_t k = 0; k < n; ++k) {
     const double g = std::exp(-(static_cast<double>(k) * interval) / kLag), p = pressure[k] - pressure[0];

@@ -5,6 +5,7 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/labels.hpp"
 
 namespace isac::explain {
 namespace {
@@ -38,28 +39,6 @@ const std::vector<double>& read_signal(const PreparedRun& run, Chain chain) {
       return run.raw_pressure[1];
   }
   return run.torque;
-}
-
-struct Label {
-  const char* signal;
-  const char* unit;
-  double scale;
-};
-
-Label label_of(const Predictor& predictor, Chain chain) {
-  static constexpr double kPerBar = 1.0 / kPascalPerKgfCm2;
-  switch (chain) {
-    case Chain::kTorque:
-      break;
-    case Chain::kMotion:
-      return {"motion", "N m", 1};
-    case Chain::kPressure1:
-      return {"p1", "kg/cm2", kPerBar};
-    case Chain::kPressure2:
-      return {"p2", "kg/cm2", kPerBar};
-  }
-  const BaselineModel& baseline = predictor.data().baseline;
-  return {baseline.output.c_str(), baseline.output_unit.c_str(), 1};
 }
 
 }  // namespace
@@ -106,7 +85,7 @@ Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain cha
 std::vector<RunTrace> traces_of(const Predictor& predictor, const ModelPoint& before, const ModelPoint& after,
                                 Chain chain, bool heldout, std::size_t most_points) {
   std::vector<RunTrace> traces;
-  const Label label = label_of(predictor, chain);
+  const Label label = label_of(predictor.data(), chain);
   for (std::size_t r = 0; r < predictor.data().runs.size(); ++r) {
     const PreparedRun& run = predictor.data().runs[r];
     if (!has_rows(predictor.data(), r, chain)) continue;
@@ -158,27 +137,27 @@ Proof::Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure
     count_ += data_->run_begin[r] < data_->run_begin[r + 1] ? 1U : 0U;
 }
 
-Sums Proof::residual(const ModelPoint& model, Chain chain) const {
-  if (!predictor_) return {};
+ModelPoint Proof::moved_here(const ModelPoint& model) const {
   ModelPoint here = model;
   here.base.resize(predictor_->base().size());
-  return raw_residual(*predictor_, here, chain);
+  here.rest
+      .clear();  // where within a step of the encoder other runs stood; here the middle of the step is all one knows
+  return here;
+}
+
+Sums Proof::residual(const ModelPoint& model, Chain chain) const {
+  return predictor_ ? raw_residual(*predictor_, moved_here(model), chain) : Sums{};
 }
 
 std::vector<Series> Proof::series(const ModelPoint& model, Chain chain) const {
   if (!predictor_) return {};
-  ModelPoint here = model;
-  here.base.resize(predictor_->base().size());
-  return residual_series(*predictor_, here, chain);
+  return residual_series(*predictor_, moved_here(model), chain);
 }
 
 std::vector<RunTrace> Proof::traces(const ModelPoint& before, const ModelPoint& after, Chain chain,
                                     std::size_t most_points) const {
   if (!predictor_) return {};
-  ModelPoint b = before, a = after;
-  b.base.resize(predictor_->base().size());
-  a.base.resize(predictor_->base().size());
-  return traces_of(*predictor_, b, a, chain, true, most_points);
+  return traces_of(*predictor_, moved_here(before), moved_here(after), chain, true, most_points);
 }
 
 }  // namespace isac::explain

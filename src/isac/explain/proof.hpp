@@ -46,6 +46,9 @@ class Proof {
                                              std::size_t most_points) const;
 
  private:
+  /// The model without what belongs to the fitted runs alone.
+  [[nodiscard]] ModelPoint moved_here(const ModelPoint& model) const;
+
   std::optional<Prepared> data_;
   std::optional<Predictor> predictor_;
   std::size_t count_ = 0;

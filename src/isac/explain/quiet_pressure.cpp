@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "isac/core/units.hpp"
@@ -16,6 +17,7 @@ constexpr std::size_t kStride = 10;            // samples between the rows that 
 constexpr double kPrior =
     0.5;  // standard deviation of λ about 1 beforehand: where the torque cannot tell, the reading stands
 constexpr double kSettled = 0.4;  // s at a run's start in which p(0) is still felt
+constexpr double kBlock = 5;      // s
 constexpr int kFunctions = 29;
 using Functions = Eigen::Matrix<double, kFunctions, 1>;
 
@@ -26,6 +28,44 @@ Eigen::VectorXd solve(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   Eigen::MatrixXd gram = scaled.transpose() * scaled;
   gram.diagonal().array() += 1e-6;
   return norm.cwiseInverse().asDiagonal() * gram.ldlt().solve(scaled.transpose() * y);
+}
+
+/// Least squares on the columns that the data bear out: the least certain goes, one at a time, until every column but the first (a
+/// constant) is kErrors of its standard errors from zero. The errors are those of blocks of time (a sandwich), as what is left is
+/// far from white; `block` counts from 0.
+Eigen::VectorXd solve_significant(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
+                                  const std::vector<std::size_t>& block) {
+  constexpr double kErrors = 3.5;
+  const Eigen::VectorXd norm = x.colwise().norm().cwiseMax(1e-12);
+  const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
+  Eigen::MatrixXd gram = scaled.transpose() * scaled;
+  gram.diagonal().array() += 1e-6;
+  const Eigen::VectorXd right = scaled.transpose() * y;
+  std::vector<Eigen::Index> in(static_cast<std::size_t>(x.cols()));
+  std::iota(in.begin(), in.end(), 0);
+  Eigen::VectorXd beta;
+  while (true) {
+    const Eigen::LDLT<Eigen::MatrixXd> factor(gram(in, in));
+    beta = factor.solve(Eigen::VectorXd(right(in)));
+    const Eigen::MatrixXd part = scaled(Eigen::all, in);
+    const Eigen::VectorXd left = y - part * beta;
+    Eigen::MatrixXd score = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(block.back()) + 1, part.cols());
+    for (Eigen::Index n = 0; n < part.rows(); ++n)
+      score.row(static_cast<Eigen::Index>(block[static_cast<std::size_t>(n)])) += left[n] * part.row(n);
+    const Eigen::VectorXd error = factor.solve(score.transpose()).rowwise().norm();
+    Eigen::Index least = 0;
+    double certain = kErrors;
+    for (Eigen::Index c = 1; c < beta.size(); ++c)
+      if (const double t = std::abs(beta[c]) / std::max(error[c], 1e-300); !(t >= certain)) {
+        certain = t;
+        least = c;
+      }
+    if (least == 0) break;
+    in.erase(in.begin() + least);
+  }
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(x.cols());
+  all(in) = beta;
+  return norm.cwiseInverse().asDiagonal() * all;
 }
 
 /// What a valve's pressure may depend on by rule, at one sample; pressures in kg/cm².
@@ -141,6 +181,8 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
     for (int i = 0; i < 2; ++i) {
       std::vector<Functions> rows;
       std::vector<double> off;
+      std::vector<std::size_t> block;
+      std::size_t last_run = 0, last_time = 0;
       for (std::size_t r = 0; r < data.runs.size(); ++r) {
         const PreparedRun& run = data.runs[r];
         if (!run.has_command) continue;
@@ -152,13 +194,21 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
         for (std::size_t k = 0; k < run.time.size(); k += kStride)
           if (run.usable[k] != 0 && run.time[k] > kSettled) {
             rows.push_back(rules.at(k));
+            const auto time = static_cast<std::size_t>(run.time[k] / kBlock);
+            if (block.empty() || r != last_run || time != last_time)
+              block.push_back(block.empty() ? 0 : block.back() + 1);
+            else
+              block.push_back(block.back());
+            last_run = r;
+            last_time = time;
             off.push_back((run.smooth_pressure[i][k] - predicted[k]) / kPascalPerKgfCm2);
           }
       }
       if (rows.size() < 20 * kFunctions) return quiet;
       Eigen::MatrixXd x(static_cast<Eigen::Index>(rows.size()), kFunctions);
       for (std::size_t n = 0; n < rows.size(); ++n) x.row(static_cast<Eigen::Index>(n)) = rows[n];
-      quiet.by_rule_[i] = solve(x, Eigen::Map<const Eigen::VectorXd>(off.data(), x.rows()));
+      quiet.by_rule_[i] =
+          solve_significant(x, Eigen::Map<const Eigen::VectorXd>(off.data(), x.rows()), block);
       if (!quiet.by_rule_[i].allFinite()) return quiet;
     }
   }

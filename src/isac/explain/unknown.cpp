@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kTried = 24;     // columns that enter the selection, best first
 constexpr double kWorthTaking = 0.10;  // of the first column's gain
 constexpr std::size_t kMostTaken = 3;
-constexpr int kBins = 24;
+constexpr int kShapeBins = 24;
 
 struct Entry {
   std::size_t column;
@@ -53,20 +53,20 @@ void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
   struct Sum {
     double total = 0, count = 0;
   };
-  std::vector<std::map<unsigned, Sum>> bins(kBins);  // by block
+  std::vector<std::map<unsigned, Sum>> bins(kShapeBins);  // by block
   const Eigen::VectorXd residual = unfiltered(data, *place.weights, place.residual);
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const Row& row = data.rows[i];
     if (row.chain != chain) continue;
     const double x = abscissa(data.runs[row.run], row.sample, unknown.variable);
     if (!std::isfinite(x)) continue;
-    const auto bin =
-        std::min<std::size_t>(kBins - 1, static_cast<std::size_t>((x - low) / (high - low) * kBins));
+    const auto bin = std::min<std::size_t>(kShapeBins - 1,
+                                           static_cast<std::size_t>((x - low) / (high - low) * kShapeBins));
     Sum& s = bins[bin][row.block];
     s.total -= residual[static_cast<Eigen::Index>(i)] * scale;  // measured − predicted
     s.count += 1;
   }
-  for (int b = 0; b < kBins; ++b) {
+  for (int b = 0; b < kShapeBins; ++b) {
     const auto& blocks = bins[static_cast<std::size_t>(b)];
     double total = 0, count = 0, scatter = 0;
     for (const auto& [block, s] : blocks) {
@@ -77,7 +77,7 @@ void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
     const double mean = total / count;
     for (const auto& [block, s] : blocks) scatter += (s.total - s.count * mean) * (s.total - s.count * mean);
     const double m = static_cast<double>(blocks.size());
-    unknown.at.push_back(low + (b + 0.5) * (high - low) / kBins);
+    unknown.at.push_back(low + (b + 0.5) * (high - low) / kShapeBins);
     unknown.shape.push_back(mean);
     unknown.band.push_back(1.96 * std::sqrt(scatter * m / (m - 1)) / count);
   }

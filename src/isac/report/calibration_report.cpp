@@ -14,17 +14,17 @@ namespace isac::report {
 namespace {
 
 /// One axis of a channel: pressures are shown in kg/cm², what the line leaves over of them in g/cm².
-struct Shown {
+struct ChannelUnit {
   double factor = 1;
   std::string unit;
 };
 
-Shown shown_unit(const std::string& unit) {
+ChannelUnit channel_unit(const std::string& unit) {
   if (unit == "Pa") return {1 / kPascalPerKgfCm2, "kg/cm2"};
   return {1, unit};
 }
 
-Shown shown_residual(const std::string& unit) {
+ChannelUnit shown_residual(const std::string& unit) {
   if (unit == "Pa") return {1e3 / kPascalPerKgfCm2, "g/cm2"};
   return {1, unit};
 }
@@ -39,8 +39,9 @@ bool is_valve(const estimate::ChannelCalibration& channel) {
 }
 
 Figure channel_figure(const estimate::ChannelCalibration& channel) {
-  const Shown reference = shown_unit(reference_unit(channel)), reading = shown_unit(channel.offset.unit),
-              left_over = shown_residual(channel.offset.unit);
+  const ChannelUnit reference = channel_unit(reference_unit(channel)),
+                    reading = channel_unit(channel.offset.unit),
+                    left_over = shown_residual(channel.offset.unit);
   std::vector<double> at, mean, error, rest;
   for (const auto& level : channel.levels) {
     at.push_back(level.reference * reference.factor);
@@ -86,7 +87,8 @@ void add_channels(Document& page, const std::vector<estimate::ChannelCalibration
                           {"Off the line (%)", true},
                           {"A line?"}}};
   for (const auto& channel : channels) {
-    const Shown reading = shown_unit(channel.offset.unit), reference = shown_unit(reference_unit(channel));
+    const ChannelUnit reading = channel_unit(channel.offset.unit),
+                      reference = channel_unit(reference_unit(channel));
     // A valve's gain is shown over its whole range, for one code moves nothing that a gauge can show.
     const double codes = is_valve(channel) ? 4095 : 1;
     if (channel.linearity == estimate::Linearity::kCurved) table.emphasised.push_back(table.rows.size());

@@ -42,7 +42,7 @@ Statistics statistics(const std::vector<double>& values) {
 double shown_factor(const std::string& unit) {
   return unit == "Pa" ? 1e-3 : 1;
 }
-std::string shown_unit(const std::string& unit) {
+std::string column_unit(const std::string& unit) {
   return unit == "Pa" ? "kPa" : unit;
 }
 
@@ -75,12 +75,12 @@ void add_statistics(Document& page, const series::Recording& recording) {
     const double factor = shown_factor(column.unit);
     if (s.present == 0) {
       table.emphasised.push_back(table.rows.size());
-      table.rows.push_back({column.name, pretty_unit(shown_unit(column.unit)), "0",
+      table.rows.push_back({column.name, pretty_unit(column_unit(column.unit)), "0",
                             whole(static_cast<double>(s.missing)), "–", "–", "–", "–"});
       continue;
     }
     if (s.missing > 0) table.emphasised.push_back(table.rows.size());
-    table.rows.push_back({column.name, pretty_unit(shown_unit(column.unit)),
+    table.rows.push_back({column.name, pretty_unit(column_unit(column.unit)),
                           whole(static_cast<double>(s.present)), whole(static_cast<double>(s.missing)),
                           number(s.least * factor),
                           number(std::abs(s.mean) < 1e-9 * s.deviation() ? 0 : s.mean * factor),
@@ -113,7 +113,7 @@ void add_signals(Document& page, const series::Recording& recording, const Base&
   std::vector<Panel> panels;
   for (const series::Column& column : recording.columns) {
     if (column.name == "time") continue;
-    Panel panel{.x = base.axis, .y = {.label = clean_utf8(column.name), .unit = shown_unit(column.unit)}};
+    Panel panel{.x = base.axis, .y = {.label = clean_utf8(column.name), .unit = column_unit(column.unit)}};
     const double factor = shown_factor(column.unit);
     if (factor == 1) {
       panel.curves = {line("", colour::kSecond, base.values, column.values)};

@@ -10,7 +10,7 @@
 namespace isac::report {
 namespace {
 
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kLags = 120;
 
 /// The run a person should judge the model by: held out if there is one, and fast.
@@ -95,7 +95,7 @@ std::vector<double> autocorrelation(const JointView& view, std::size_t lags) {
     for (std::size_t lag = 0; lag <= lags && lag < e.size(); ++lag)
       for (std::size_t i = lag; i < e.size(); ++i) sum[lag] += e[i] * e[i - lag];
   }
-  std::vector<double> out(lags + 1, kNaN);
+  std::vector<double> out(lags + 1, kGap);
   for (std::size_t lag = 0; lag <= lags && sum[0] > 0; ++lag) out[lag] = sum[lag] / sum[0];
   return out;
 }

@@ -12,24 +12,13 @@
 namespace isac::report {
 namespace {
 
-constexpr std::size_t kMostRuns = 9;  // drawn in one picture
-
-struct Shown {
-  double per_pascal = 1;
-  std::string unit;
-};
-
-std::vector<double> in_unit(const std::vector<double>& values, double factor) {
-  std::vector<double> out(values.size());
-  std::transform(values.begin(), values.end(), out.begin(), [factor](double v) { return v * factor; });
-  return out;
-}
+constexpr std::size_t kMostCurves = 9;  // drawn in one picture
 
 double mean_contraction(const estimate::MuscleRunResult& run) {
   return quantile(run.contraction, 0.5);
 }
 
-/// Runs in the order of their contraction, thinned to kMostRuns.
+/// Runs in the order of their contraction, thinned to kMostCurves.
 std::vector<const estimate::MuscleRunResult*> runs_of(const estimate::MuscleModelResult& model,
                                                       bool heldout) {
   std::vector<const estimate::MuscleRunResult*> all;
@@ -37,14 +26,15 @@ std::vector<const estimate::MuscleRunResult*> runs_of(const estimate::MuscleMode
     if (run.heldout == heldout && !run.pressure.empty()) all.push_back(&run);
   std::stable_sort(all.begin(), all.end(),
                    [](const auto* a, const auto* b) { return mean_contraction(*a) < mean_contraction(*b); });
-  if (all.size() <= kMostRuns) return all;
+  if (all.size() <= kMostCurves) return all;
   std::vector<const estimate::MuscleRunResult*> thinned;
-  for (std::size_t k = 0; k < kMostRuns; ++k) thinned.push_back(all[k * (all.size() - 1) / (kMostRuns - 1)]);
+  for (std::size_t k = 0; k < kMostCurves; ++k)
+    thinned.push_back(all[k * (all.size() - 1) / (kMostCurves - 1)]);
   return thinned;
 }
 
 /// One model: force over pressure, one colour per contraction; dots measured, lines the model.
-Panel force_panel(const estimate::MuscleModelResult& model, bool heldout, const Shown& shown,
+Panel force_panel(const estimate::MuscleModelResult& model, bool heldout, const ShownPressure& shown,
                   const std::string& title) {
   Panel panel{.title = title,
               .x = {.label = "Pressure p", .unit = shown.unit},
@@ -73,7 +63,7 @@ Panel force_panel(const estimate::MuscleModelResult& model, bool heldout, const 
   return panel;
 }
 
-Figure residual_figure(const estimate::MuscleFit& fit, std::size_t models, const Shown& shown) {
+Figure residual_figure(const estimate::MuscleFit& fit, std::size_t models, const ShownPressure& shown) {
   Figure figure{
       .caption = "Measured less modelled force over pressure and over contraction, all runs, best models.",
       .columns = 2,
@@ -118,7 +108,7 @@ void add_ranking(Document& page, const estimate::MuscleFit& fit) {
   page.table(table);
 }
 
-void add_hysteresis(Document& page, const estimate::MuscleFit& fit, const Shown& shown) {
+void add_hysteresis(Document& page, const estimate::MuscleFit& fit, const ShownPressure& shown) {
   if (fit.hysteresis.empty()) return;
   Table table{
       .caption =
@@ -140,7 +130,7 @@ std::string render_muscle_report(const MuscleReportInput& input) {
     throw Error(ErrorKind::kUsage, "fit_missing", "a muscle report needs the fit it reports on");
   require_gnuplot();
   const estimate::MuscleFit& fit = *input.fit;
-  const Shown shown{pressure_per_pascal(input.pressure_unit), input.pressure_unit};
+  const ShownPressure shown{pressure_per_pascal(input.pressure_unit), input.pressure_unit};
   Document page = open_page(input.head, "Identification of the muscle");
   const bool heldout = !fit.ranking.empty() && std::isfinite(fit.ranking.front().heldout_rmse);
   if (!fit.ranking.empty()) {

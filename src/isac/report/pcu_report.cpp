@@ -14,11 +14,6 @@ namespace {
 
 constexpr std::size_t kMostSteps = 8;  // per direction, in one picture
 
-struct Shown {
-  double per_pascal = 1;
-  std::string unit;
-};
-
 double zero_of(const estimate::PcuStep& step) {
   if (std::isfinite(step.step_time)) return step.step_time;
   return std::isfinite(step.start.value) ? step.start.value : step.time.front();
@@ -27,12 +22,6 @@ double zero_of(const estimate::PcuStep& step) {
 std::vector<double> since_step(const estimate::PcuStep& step) {
   std::vector<double> out = step.time;
   for (double& t : out) t -= zero_of(step);
-  return out;
-}
-
-std::vector<double> in_unit(const std::vector<double>& values, double factor) {
-  std::vector<double> out(values.size());
-  std::transform(values.begin(), values.end(), out.begin(), [factor](double v) { return v * factor; });
   return out;
 }
 
@@ -45,7 +34,8 @@ std::string name_of(const estimate::PcuStep& step, std::size_t number_of_step) {
 }
 
 /// Responses of one direction over the time since the step, and what the first-order curve leaves over.
-Figure response_figure(const estimate::PcuFit& fit, estimate::StepDirection direction, const Shown& shown) {
+Figure response_figure(const estimate::PcuFit& fit, estimate::StepDirection direction,
+                       const ShownPressure& shown) {
   Figure figure{
       .caption =
           "Step responses, " + std::string(direction_text(direction)) +
@@ -124,7 +114,7 @@ Figure normalised_figure(const estimate::PcuFit& fit) {
   return figure;
 }
 
-void add_steps(Document& page, const estimate::PcuFit& fit, const Shown& shown) {
+void add_steps(Document& page, const estimate::PcuFit& fit, const ShownPressure& shown) {
   const std::string unit = " (" + pretty_unit(shown.unit) + ")";
   Table table{.caption = "Steps, each fitted by itself.",
               .columns = {{"Step", true},
@@ -188,7 +178,7 @@ std::string render_pcu_report(const PcuReportInput& input) {
     throw Error(ErrorKind::kUsage, "fit_missing", "a valve report needs the fit it reports on");
   require_gnuplot();
   const estimate::PcuFit& fit = *input.fit;
-  const Shown shown{pressure_per_pascal(input.pressure_unit), input.pressure_unit};
+  const ShownPressure shown{pressure_per_pascal(input.pressure_unit), input.pressure_unit};
   Document page = open_page(input.head, "Identification of the pressure control unit");
   std::vector<Card> cards;
   for (const char* name : {"K_C", "T_C", "dead_time"}) {

@@ -1,5 +1,7 @@
 #include "isac/report/report_head.hpp"
 
+#include <algorithm>
+
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 
@@ -21,6 +23,12 @@ double pressure_per_pascal(const std::string& unit) {
     throw Error(ErrorKind::kUsage, "unit_wrong",
                 "\"" + unit + "\" is not a unit of pressure; use kg/cm2, bar, kPa or Pa");
   return 1 / pressure->scale;
+}
+
+std::vector<double> in_unit(const std::vector<double>& values, double factor) {
+  std::vector<double> out(values.size());
+  std::transform(values.begin(), values.end(), out.begin(), [factor](double v) { return v * factor; });
+  return out;
 }
 
 }  // namespace isac::report

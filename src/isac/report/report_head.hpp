@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "isac/report/document.hpp"
 #include "isac/report/fit_reports.hpp"
@@ -16,5 +17,12 @@ namespace isac::report {
 void close_page(Document& page, const ReportHead& head);
 /// Factor from Pa to the unit named; throws when it is not a unit of pressure.
 [[nodiscard]] double pressure_per_pascal(const std::string& unit);
+/// The unit that a report shows pressures in.
+struct ShownPressure {
+  double per_pascal = 1;
+  std::string unit;
+};
+/// Every value times `factor`.
+[[nodiscard]] std::vector<double> in_unit(const std::vector<double>& values, double factor);
 
 }  // namespace isac::report

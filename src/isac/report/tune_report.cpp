@@ -15,11 +15,11 @@
 namespace isac::report {
 namespace {
 
-using tune::Candidate;
+using TuneCandidate = tune::Candidate;
 
 constexpr double kDegreesPerRadian = 180 / kPi;
 
-const Candidate* chosen_of(const TuneReportInput& input) {
+const TuneCandidate* chosen_of(const TuneReportInput& input) {
   return input.tuning != nullptr && input.tuning->chosen ? &input.tuning->candidates[*input.tuning->chosen]
                                                          : nullptr;
 }
@@ -67,7 +67,7 @@ Figure experiment_figure(const TuneReportInput& input) {
 }
 
 /// Gain and phase of one loop; the phase unwrapped, in degrees.
-void add_bode(Figure& figure, const tune::JointModel& model, const Candidate& c, const char* label,
+void add_bode(Figure& figure, const tune::JointModel& model, const TuneCandidate& c, const char* label,
               const char* shade, Dash dash) {
   std::vector<double> frequency, size, phase;
   double last = 0;
@@ -88,7 +88,7 @@ void add_bode(Figure& figure, const tune::JointModel& model, const Candidate& c,
   figure.panels[1].curves.push_back(std::move(turn));
 }
 
-Figure bode_figure(const TuneReportInput& input, const Candidate& chosen) {
+Figure bode_figure(const TuneReportInput& input, const TuneCandidate& chosen) {
   const tune::Margins& m = chosen.figures.margins;
   Figure figure{.id = "tune-bode",
                 .alt = "Frequency response of the loop with its margins",
@@ -115,8 +115,8 @@ Figure bode_figure(const TuneReportInput& input, const Candidate& chosen) {
   return figure;
 }
 
-Figure time_figure(const TuneReportInput& input, const Candidate& chosen, bool step) {
-  const auto run = [&](const Candidate& c) {
+Figure time_figure(const TuneReportInput& input, const TuneCandidate& chosen, bool step) {
+  const auto run = [&](const TuneCandidate& c) {
     return step ? tune::run_step(*input.model, *input.model, c.gains)
                 : tune::run_trajectory(*input.model, *input.model, c.gains);
   };
@@ -133,7 +133,7 @@ Figure time_figure(const TuneReportInput& input, const Candidate& chosen, bool s
   figure.panels = {{.x = time, .y = {.label = "Angle φ", .unit = "rad"}},
                    {.x = time, .y = {.label = "Δp", .unit = "kg/cm²"}, .height = 110}};
   bool first = true;
-  const auto add = [&](const Candidate& c, const char* label, const char* shade, Dash dash) {
+  const auto add = [&](const TuneCandidate& c, const char* label, const char* shade, Dash dash) {
     const tune::Trace t = run(c);
     if (first) figure.panels[0].curves.push_back(line("reference", colour::kMeasured, t.time, t.reference));
     first = false;
@@ -180,7 +180,7 @@ void add_candidates(Document& page, const TuneReportInput& input) {
                   {"Effort (kg/cm² s)", true},
                   {"Stable (%)", true},
                   {"Within limits (%)", true}}};
-  const auto add = [&](const Candidate& c) {
+  const auto add = [&](const TuneCandidate& c) {
     const tune::Assessment& a = c.figures;
     if (a.draws == 0) return;
     const bool lost = a.overshoot_p95 >= 5;
@@ -198,7 +198,7 @@ void add_candidates(Document& page, const TuneReportInput& input) {
   page.table(table);
 }
 
-void add_gains(Document& page, const TuneReportInput& input, const Candidate& chosen) {
+void add_gains(Document& page, const TuneReportInput& input, const TuneCandidate& chosen) {
   Table table{.caption = "Gains of PI-MBPI, in the units of params.toml.",
               .columns = {{"Gain"}, {"Unit"}, {"before", true}, {"new", true}}};
   const auto before = [&](double control::PidGains<double>::*member, bool torque) {
@@ -227,7 +227,7 @@ std::string finite_or(double value, const std::string& text, const char* otherwi
 std::string render_tune_report(const TuneReportInput& input) {
   require_gnuplot();
   Document page = open_page(input.head, "Tuning of a joint");
-  const Candidate* chosen = chosen_of(input);
+  const TuneCandidate* chosen = chosen_of(input);
   const std::string& refusal = input.refusal;
   if (refusal.empty() && chosen != nullptr)
     page.box(BoxKind::kGood, "The gains hold their limits",

@@ -18,8 +18,8 @@ std::string joint_column(const char* name, int joint, int joints) {
   return joints == 1 ? std::string(name) : std::string(name) + "_" + std::to_string(joint + 1);
 }
 
-[[noreturn]] void refuse(const std::string& code, const std::string& text,
-                         const std::filesystem::path& file) {
+[[noreturn]] void refuse_file(const std::string& code, const std::string& text,
+                              const std::filesystem::path& file) {
   throw Error(ErrorKind::kBadInput, code, text, {file.string(), 0, 0});
 }
 
@@ -35,7 +35,7 @@ std::vector<MotionPoint> read_points(const std::filesystem::path& path,
       record::read_recording(path, {.map = {}, .require_time = true, .hash = false});
   const auto& time = file.column("time").values;
   if (time.size() < 2)
-    refuse("points_too_few", "has fewer than two points; a motion needs at least two", path);
+    refuse_file("points_too_few", "has fewer than two points; a motion needs at least two", path);
   std::vector<MotionPoint> points(time.size());
   for (std::size_t j = 0; j < limits.size(); ++j) {
     const std::string name = limits.size() == 1 ? "angle" : "phi" + std::to_string(j + 1);
@@ -45,20 +45,20 @@ std::vector<MotionPoint> read_points(const std::filesystem::path& path,
       points[k].time = time[k] - time[0];
       points[k].angle[j] = angle[k];
       if (!std::isfinite(angle[k]))
-        refuse("point_missing", where + "the angle is missing; give every one", path);
+        refuse_file("point_missing", where + "the angle is missing; give every one", path);
       if (angle[k] < limits[j].angle_low || angle[k] > limits[j].angle_high) {
-        refuse("point_unreachable",
-               where + degrees(angle[k]) + " is outside the joint's " + degrees(limits[j].angle_low) +
-                   " to " + degrees(limits[j].angle_high) + "; move the point or set other limits",
-               path);
+        refuse_file("point_unreachable",
+                    where + degrees(angle[k]) + " is outside the joint's " + degrees(limits[j].angle_low) +
+                        " to " + degrees(limits[j].angle_high) + "; move the point or set other limits",
+                    path);
       }
       if (k == 0) continue;
       const double speed = std::abs(angle[k] - angle[k - 1]) / (time[k] - time[k - 1]);
       if (speed > limits[j].speed) {
-        refuse("point_too_fast",
-               where + "the joint would have to move at " + std::to_string(speed) + " rad/s and may at " +
-                   std::to_string(limits[j].speed) + " rad/s; give it more time",
-               path);
+        refuse_file("point_too_fast",
+                    where + "the joint would have to move at " + std::to_string(speed) +
+                        " rad/s and may at " + std::to_string(limits[j].speed) + " rad/s; give it more time",
+                    path);
       }
     }
   }

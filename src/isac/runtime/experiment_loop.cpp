@@ -54,7 +54,8 @@ card::Task to_task(const series::Ask& ask) noexcept {
 }  // namespace
 
 ExperimentLoop::ExperimentLoop(card::Opened& rig, SignalMap& map, const series::Program& program,
-                               const LoopOptions& options, Live& live, const std::atomic<bool>& stop) noexcept
+                               const LoopOptions& options, RecordingLive& live,
+                               const std::atomic<bool>& stop) noexcept
     : rig_(rig),
       map_(map),
       program_(program),

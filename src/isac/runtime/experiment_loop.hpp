@@ -6,7 +6,7 @@
 /// Time is the card's own; a loop that comes late skips whole periods (never a burst to catch up) and counts them.
 ///
 /// Units: SI, card time in ns. Real time: record() allocates nothing, takes no lock and writes no file; what a simulated
-/// person does when asked is outside this promise. Threads: one thread runs a loop; `Live` and `stop` are for others.
+/// person does when asked is outside this promise. Threads: one thread runs a loop; `RecordingLive` and `stop` are for others.
 /// Errors: how the loop ended is in LoopResult; lead_in() and record() throw nothing. The caller vents (VentGuard).
 /// Source: seed 3.2 to 3.4, D.2.2 (start-up), E.2.2.
 #pragma once
@@ -32,7 +32,7 @@ struct LoopOptions {
 };
 
 /// What the loop shows of itself while it runs.
-struct Live {
+struct RecordingLive {
   std::atomic<bool> recording{false};
   std::atomic<int> stage{-1};                       ///< whose prompt is due; −1: none yet
   std::atomic<double> elapsed{0};                   ///< s since the recording began
@@ -62,7 +62,7 @@ struct LoopResult {
 class ExperimentLoop {
  public:
   ExperimentLoop(card::Opened& rig, SignalMap& map, const series::Program& program,
-                 const LoopOptions& options, Live& live, const std::atomic<bool>& stop) noexcept;
+                 const LoopOptions& options, RecordingLive& live, const std::atomic<bool>& stop) noexcept;
 
   [[nodiscard]] LoopResult lead_in() noexcept;
   [[nodiscard]] LoopResult record(LogWriter& writer) noexcept;
@@ -89,7 +89,7 @@ class ExperimentLoop {
   SignalMap& map_;
   const series::Program& program_;
   LoopOptions options_;
-  Live& live_;
+  RecordingLive& live_;
   const std::atomic<bool>& stop_;
   SafetyMonitor safety_;
   std::int64_t period_ns_;

@@ -192,7 +192,7 @@ class Session {
     return opened_at_ + std::chrono::duration_cast<Clock::duration>(std::chrono::nanoseconds(card_ns));
   }
 
-  void play(const series::Program& program, const fs::path& file, Live& live, Work& work) noexcept {
+  void play(const series::Program& program, const fs::path& file, RecordingLive& live, Work& work) noexcept {
     const VentGuard vent(*rig_.card);
     try {
       ExperimentLoop loop(rig_, map_, program, loop_options(program), live, stop_);
@@ -212,7 +212,7 @@ class Session {
     }
   }
 
-  void show_due_prompts(const series::Program& program, const Live& live, int& shown) const {
+  void show_due_prompts(const series::Program& program, const RecordingLive& live, int& shown) const {
     const int due = live.stage.load(std::memory_order_acquire);
     while (shown < due) observer_.prompt(program.stages[static_cast<std::size_t>(++shown)].prompt);
   }
@@ -222,7 +222,7 @@ class Session {
     outcome.file = file_of(options_, program);
     outcome.program = program.name;
     make_folder(outcome.file.parent_path());
-    Live live;
+    RecordingLive live;
     Work work;
     std::thread loop([&] {
       play(program, outcome.file, live, work);

@@ -58,7 +58,7 @@ class SessionObserver {
                                bool by_hand) = 0;
   virtual void prompt(const std::string& sentence) = 0;
   /// About twenty times a second.
-  virtual void progress(const series::Program& program, const Live& live) = 0;
+  virtual void progress(const series::Program& program, const RecordingLive& live) = 0;
   virtual void judged(const RecordingOutcome& outcome) = 0;
 };
 

@@ -24,7 +24,7 @@ std::string level_words(const series::SweepFacts::Level& level) {
 
 }  // namespace
 
-std::string progress_line(const series::Program& program, const Live& live, int columns) {
+std::string progress_line(const series::Program& program, const RecordingLive& live, int columns) {
   const double elapsed = live.elapsed.load(std::memory_order_relaxed);
   if (!live.recording.load(std::memory_order_relaxed) && live.rows.load(std::memory_order_relaxed) == 0) {
     return fmt::format("getting ready  angle {:+.2f} rad  dp {:+.2f} kg/cm2", live.angle.load(),

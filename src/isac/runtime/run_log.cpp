@@ -105,7 +105,7 @@ CommandComparer::CommandComparer(const series::Recording& run, int joints) : joi
   for (std::size_t k = 0; k < time.size() && answered[k] != 0.0; ++k)
     times_.push_back(std::llround(time[k] * 1e9));
   for (int j = 0; j < joints; ++j) {
-    const std::string behind = joints == 1 ? "" : "_" + std::to_string(j + 1);
+    const std::string behind = joints == 1 ? std::string() : std::string("_").append(std::to_string(j + 1));
     const auto &p1 = run.column("p1_cmd" + behind).values, &p2 = run.column("p2_cmd" + behind).values;
     for (std::size_t k = 0; k < times_.size(); ++k)
       commands_[k][static_cast<std::size_t>(j)] = {p1[k], p2[k]};

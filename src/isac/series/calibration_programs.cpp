@@ -22,7 +22,7 @@ constexpr double kAngleTolerance = 2.0 * 2.0 * kPi / 8000.0;    // two steps of 
   throw Error(ErrorKind::kUsage, code, text);
 }
 
-std::string kgf(double pascal, const char* format = "%.4g") {
+std::string kgf_text(double pascal, const char* format = "%.4g") {
   return number(format, pascal / kPascalPerKgfCm2);
 }
 
@@ -85,9 +85,9 @@ Program weight_on(int sensor, double newton, double seconds) {
 }
 
 Program supply_at(double pascal, double seconds) {
-  const std::string shown = kgf(pascal) + " kg/cm2";
-  Program program = level("pressure_" + kgf(pascal, "%.2f"), "p1 = " + shown + ", p2 = " + shown, seconds,
-                          {{"p1", kPressureTolerance}, {"p2", kPressureTolerance}});
+  const std::string shown = kgf_text(pascal) + " kg/cm2";
+  Program program = level("pressure_" + kgf_text(pascal, "%.2f"), "p1 = " + shown + ", p2 = " + shown,
+                          seconds, {{"p1", kPressureTolerance}, {"p2", kPressureTolerance}});
   Ask ask;
   ask.kind = Ask::Kind::kConnectSupply;
   ask.pressure = pascal;
@@ -142,9 +142,9 @@ std::vector<double> supplies_of(const ExcitationOptions& options) {
   }
   for (const double supply : supplies) {
     if (std::isfinite(supply) && supply >= 0.0 && supply <= options.pressure_limit * (1.0 + 1e-9)) continue;
-    refuse("supply_beyond_limit", "a supply of " + kgf(supply) +
+    refuse("supply_beyond_limit", "a supply of " + kgf_text(supply) +
                                       " kg/cm2 must lie between 0 and the pressure limit of " +
-                                      kgf(options.pressure_limit) + " kg/cm2; choose another level");
+                                      kgf_text(options.pressure_limit) + " kg/cm2; choose another level");
   }
   if (supplies.size() < 2) {
     refuse("supply_one_level",

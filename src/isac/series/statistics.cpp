@@ -9,7 +9,7 @@
 namespace isac::series {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> finite(std::span<const double> x) {
   std::vector<double> out;
@@ -20,7 +20,7 @@ std::vector<double> finite(std::span<const double> x) {
 }
 
 double quantile_in_place(std::vector<double>& x, double probability) {
-  if (x.empty()) return kNan;
+  if (x.empty()) return kNoValue;
   const double place = probability * static_cast<double>(x.size() - 1);
   const auto low = static_cast<std::size_t>(place);
   std::nth_element(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(low), x.end());
@@ -67,18 +67,18 @@ double robust_deviation(std::span<const double> x, bool about_zero) {
 }
 
 double student_t_limit(double confidence, double degrees_of_freedom) {
-  if (!(degrees_of_freedom > 0)) return kNan;
+  if (!(degrees_of_freedom > 0)) return kNoValue;
   return boost::math::quantile(boost::math::students_t(degrees_of_freedom), 0.5 + 0.5 * confidence);
 }
 
 double student_t_two_sided(double t, double degrees_of_freedom) {
-  if (!(degrees_of_freedom > 0) || !std::isfinite(t)) return kNan;
+  if (!(degrees_of_freedom > 0) || !std::isfinite(t)) return kNoValue;
   return 2.0 *
          boost::math::cdf(boost::math::complement(boost::math::students_t(degrees_of_freedom), std::abs(t)));
 }
 
 double chi_square_upper(double statistic, double degrees_of_freedom) {
-  if (!(degrees_of_freedom > 0) || !(statistic >= 0)) return kNan;
+  if (!(degrees_of_freedom > 0) || !(statistic >= 0)) return kNoValue;
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(degrees_of_freedom), statistic));
 }
 

@@ -30,7 +30,7 @@ using Stepper = odeint::result_of::make_dense_output<Dopri5>::type;
 constexpr double kLongestStep = 0.01;  // s: finer than a tremor, shorter than the hand's plan
 constexpr double kFirstStep = 1e-3;    // s
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr double kPascal = kPascalPerKgfCm2;
+constexpr double kPerKgfCm2 = kPascalPerKgfCm2;
 
 enum class Event : std::uint8_t { kNone, kReversal, kStop, kBreakaway };
 
@@ -112,7 +112,7 @@ class Plant::Impl {
   PlantState state() const noexcept {
     PlantState s;
     s.time = time_;
-    for (std::size_t i = 0; i < 2; ++i) s.pressure[i] = x_[i] * kPascal;
+    for (std::size_t i = 0; i < 2; ++i) s.pressure[i] = x_[i] * kPerKgfCm2;
     s.joint = {.angle = x_[kPhi], .velocity = x_[kOmega]};
     const Torques torques = physics_.torques(point_at(time_, x_));
     s.torque = torques.muscle;

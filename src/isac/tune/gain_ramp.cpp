@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kNearEnough =
     -0.35;  // per period: the root is then 5 to 10 % away in gain, and the regression short
-constexpr double kNoiseFactor = 5;  // turning points count when they stand out this far
+constexpr double kTurnNoiseFactor = 5;  // turning points count when they stand out this far
 constexpr double kAgree = 0.25;  // the regression extrapolates over a few per cent of gain, but under noise
 constexpr double kClear = 3;     // half swings over the threshold, so that noise does not hold them up
 constexpr int kFewestTurns = 5;  // four half swings: two ratios
@@ -21,7 +21,7 @@ GainRamp::GainRamp(const ExperimentSettings& settings, const GainRampSettings& r
     : Experiment(settings), ramp_(ramp), gain_(ramp.first_gain), reference_(-ramp.kick) {}
 
 double GainRamp::threshold() const noexcept {
-  return std::max(kNoiseFactor * noise(), 0.02 * ramp_.kick);
+  return std::max(kTurnNoiseFactor * noise(), 0.02 * ramp_.kick);
 }
 
 void GainRamp::begin_level(double time, double gain) noexcept {

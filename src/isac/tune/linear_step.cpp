@@ -35,12 +35,12 @@ Step step_of(const Matrix4& system, double time) {
 }
 
 /// From one row to the next, and what is read: x_k+1 = Φ x_k + Γ_old u_k−whole−1 + Γ_new u_k−whole, φ_k = read · x_k.
-struct Row {
+struct StepRow {
   Eigen::Matrix3d phi;
   State old_gain, new_gain, read;
   std::ptrdiff_t whole;  ///< rows of dead time
 };
-Row row_of(const LagPlant& plant, double interval) {
+StepRow row_of(const LagPlant& plant, double interval) {
   const Matrix4 system = system_of(plant);
   const double behind = plant.dead_time / interval, whole = std::floor(behind);
   const double part = (behind - whole) * interval;  // the older command still acts this long
@@ -110,7 +110,7 @@ models::StepShape<double> tangent_of(const LagPlant& plant) {
 
 void simulate_into(const LagPlant& plant, double interval, std::span<const double> command,
                    std::vector<double>& angle) {
-  const Row row = row_of(plant, interval);
+  const StepRow row = row_of(plant, interval);
   const Delayed delayed{command, row.whole};
   State x = State::Zero();
   angle.resize(command.size());
@@ -123,7 +123,7 @@ void simulate_into(const LagPlant& plant, double interval, std::span<const doubl
 
 void simulate_means_into(const LagPlant& plant, double interval, std::span<const double> command,
                          std::size_t rows, std::vector<double>& mean) {
-  const Row row = row_of(plant, interval);
+  const StepRow row = row_of(plant, interval);
   const auto n = static_cast<Eigen::Index>(rows), blocks = static_cast<Eigen::Index>(command.size() / rows);
   // Of x at a block's first row and the commands from one row before it: the sum of φ over the block, and x behind it.
   Eigen::Matrix<double, 4, 3> from_state = Eigen::Matrix<double, 4, 3>::Zero();

@@ -102,7 +102,7 @@ PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& option
   PlantSolution best;
   std::vector<PlantSolution> solutions;
   for (const PlantVector& start : starts_of(problem)) {
-    solutions.push_back(solve(problem, start, Form::kLag));
+    solutions.push_back(solve(problem, start, LagForm::kLag));
     const PlantSolution& s = solutions.back();
     if (std::isfinite(s.cost) && s.cost < best.cost) best = s;
   }
@@ -122,15 +122,15 @@ PlantFit fit_plant(const ExperimentRecord& record, const PlantFitOptions& option
   const double mean_square = squares / static_cast<double>(fit.predicted.size());
   fit.rmse = std::sqrt(mean_square);
   fit.misfit = std::sqrt(std::max(0.0, mean_square - options.noise * options.noise)) / problem.size;
-  const Spread spread = spread_of(problem, best.x, Form::kLag);
+  const Spread spread = spread_of(problem, best.x, LagForm::kLag);
   for (const Fact& fact : parameter_facts())
     fit.parameters.push_back(estimated(fact, problem, best.x, spread));
   for (Estimated& e : fit.parameters) e.ci_low = e.ci_low < 0 ? 0 : e.ci_low;  // none can be negative
   // What follows from the plant is taken in orders of s: dead time of either sign first, then the bend.
-  const PlantSolution shifted = solve(problem, best.x, Form::kShiftedLag);
-  const PlantSolution bent = solve(problem, shifted.x, Form::kBentLag);
-  const Spread first = spread_of(problem, shifted.x, Form::kShiftedLag);
-  const Spread second = spread_of(problem, bent.x, Form::kBentLag);
+  const PlantSolution shifted = solve(problem, best.x, LagForm::kShiftedLag);
+  const PlantSolution bent = solve(problem, shifted.x, LagForm::kBentLag);
+  const Spread first = spread_of(problem, shifted.x, LagForm::kShiftedLag);
+  const Spread second = spread_of(problem, bent.x, LagForm::kBentLag);
   const double weight = weight_of_bent(problem, shifted, bent);
   for (const Fact& fact : derived_facts())
     fit.derived.push_back(

@@ -130,7 +130,7 @@ PlantProblem plant_problem(const ExperimentRecord& record, const PlantFitOptions
   return problem;
 }
 
-PlantSolution solve(const PlantProblem& problem, const PlantVector& start, Form form) {
+PlantSolution solve(const PlantProblem& problem, const PlantVector& start, LagForm form) {
   PlantSolution s;
   s.x = start;
   ceres::Problem p;
@@ -148,13 +148,13 @@ PlantSolution solve(const PlantProblem& problem, const PlantVector& start, Form 
   }
   p.SetParameterLowerBound(s.x.data(), kLogDamping, std::log(0.005));
   p.SetParameterUpperBound(s.x.data(), kLogDamping, std::log(20.0));
-  p.SetParameterLowerBound(s.x.data(), kDeadTime, form == Form::kLag ? 0 : -1);
+  p.SetParameterLowerBound(s.x.data(), kDeadTime, form == LagForm::kLag ? 0 : -1);
   p.SetParameterUpperBound(s.x.data(), kDeadTime, 5);
   p.SetParameterLowerBound(s.x.data(), kBend, -1);
   p.SetParameterUpperBound(s.x.data(), kBend, 1);
   std::vector<int> held;
   if (!problem.fit_dead_time) held.push_back(kDeadTime);
-  if (form != Form::kBentLag) held.push_back(kBend);
+  if (form != LagForm::kBentLag) held.push_back(kBend);
   if (!held.empty()) p.SetManifold(s.x.data(), new ceres::SubsetManifold(kPlantUnknowns, held));
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;

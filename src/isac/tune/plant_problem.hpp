@@ -1,10 +1,10 @@
 /// @file
 /// The least squares behind plant_fit.hpp: a record on an even grid, its residuals, where to begin, one solution.
 ///
-///   x = (log K, log T_C, log T_J, log ζ, L/scale, φ_0/size, load/reach, q/scale²);  `Form` says which of them are searched for
+///   x = (log K, log T_C, log T_J, log ζ, L/scale, φ_0/size, load/reach, q/scale²);  `LagForm` says which of them are searched for
 ///   r_k = (φ_k − φ(t_k; x))/size − φ_0/size                                            averaged over `thin` rows
 /// Units: SI inside the plant, x and r without. Threads: pure. Errors: plant_problem() throws isac::Error "no_usable_data".
-/// Source: docs/derivations/tuning.md. Example: `solve(problem, starts_of(problem).front().x, Form::kLag)`.
+/// Source: docs/derivations/tuning.md. Example: `solve(problem, starts_of(problem).front().x, LagForm::kLag)`.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ using PlantVector = std::array<double, kPlantUnknowns>;
 
 /// The joint's own form; the same with L of either sign (a lead beyond all lags is dead time below zero); and with (1 + q s²)
 /// too: what it needs there says how far the record is from the form.
-enum class Form { kLag, kShiftedLag, kBentLag };
+enum class LagForm { kLag, kShiftedLag, kBentLag };
 
 struct PlantProblem {
   ExperimentRecord record;   ///< on an even grid
@@ -64,6 +64,6 @@ struct PlantSolution {
 /// Best first; at most four.
 [[nodiscard]] std::vector<PlantVector> starts_of(const PlantProblem& problem);
 
-[[nodiscard]] PlantSolution solve(const PlantProblem& problem, const PlantVector& start, Form form);
+[[nodiscard]] PlantSolution solve(const PlantProblem& problem, const PlantVector& start, LagForm form);
 
 }  // namespace isac::tune

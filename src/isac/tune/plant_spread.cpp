@@ -42,11 +42,11 @@ void set_interval(Estimated& e, double freedom) {
 
 }  // namespace
 
-Spread spread_of(const PlantProblem& problem, const PlantVector& x, Form form) {
+Spread spread_of(const PlantProblem& problem, const PlantVector& x, LagForm form) {
   std::vector<int> free = {kLogGain, kLogLag, kLogTime, kLogDamping, kOffset, kLoad};
-  if (problem.fit_dead_time && (form != Form::kLag || x[kDeadTime] > kLeastDeadTime))
+  if (problem.fit_dead_time && (form != LagForm::kLag || x[kDeadTime] > kLeastDeadTime))
     free.push_back(kDeadTime);
-  if (form == Form::kBentLag) free.push_back(kBend);
+  if (form == LagForm::kBentLag) free.push_back(kBend);
   const Eigen::MatrixXd jacobian = jacobian_of(problem, x, free);
   const auto n = jacobian.rows(), m = jacobian.cols();
   Eigen::VectorXd residual(n);

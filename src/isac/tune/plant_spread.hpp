@@ -8,7 +8,7 @@
 ///
 /// Units: each fact's own. Threads: pure. Errors: none; NaN where nothing is known, as of a dead time at its bound.
 /// Source: docs/derivations/tuning.md; Burnham and Anderson 2002 (weights).
-/// Example: `estimated(derived_facts()[0], problem, solution.x, spread_of(problem, solution.x, Form::kLag))`.
+/// Example: `estimated(derived_facts()[0], problem, solution.x, spread_of(problem, solution.x, LagForm::kLag))`.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,7 +26,7 @@ struct Spread {
   Eigen::VectorXd freedom;
 };
 
-[[nodiscard]] Spread spread_of(const PlantProblem& problem, const PlantVector& x, Form form);
+[[nodiscard]] Spread spread_of(const PlantProblem& problem, const PlantVector& x, LagForm form);
 
 /// What is told of the plant: a name, its unit, its value.
 struct Fact {
