@@ -29,6 +29,7 @@ Json disagreement_of(const explain::Explanation& e) {
                        {"unit", gap.unit},
                        {"rmse", json_number(gap.rmse)},
                        {"after", json_number(gap.after)},
+                       {"heldout", json_number(gap.heldout)},
                        {"noise_floor", json_number(gap.noise_floor)},
                        {"noise_floor_from", words_or_null(gap.floor_from)},
                        {"p_value", json_number(gap.p_value)}});

@@ -29,7 +29,7 @@ namespace {
 constexpr const char* kUsage =
     "blind_run --results FILE --explain PROGRAM [--tier NAMES] [--noise KINDS] [--effect IDS] [--count N] "
     "[--seed N]\n"
-    "          [--jobs N] [--timeout S] [--oracle] [--baselines PROGRAM] [-- WORDS FOR PROGRAM]\n"
+    "          [--jobs N] [--timeout S] [--oracle] [--twin] [--baselines PROGRAM] [-- WORDS FOR PROGRAM]\n"
     "  NAMES of none, strong, clear, faint, pair, outside (also called unknown), leave-one-out (comma "
     "between;\n"
     "  default all but the last); KINDS as in blind_generate\n"
@@ -37,6 +37,8 @@ constexpr const char* kUsage =
     "  --count: datasets per kind of noise, where one effect is hidden also per effect (default 1)\n"
     "  --oracle: where names can be right (strong, clear, faint, pair) the label says what nobody can tell "
     "apart\n"
+    "  --twin: the program is also asked about the same day with nothing hidden: the floor of the gap that "
+    "it closes\n"
     "  --baselines: blind_baselines, asked about the same datasets; without --explain it is asked alone\n"
     "  among WORDS, {ids} stands for what is hidden, for a test that takes the truth out of the catalogue\n";
 
@@ -48,7 +50,7 @@ struct Plan {
   int count = 1, jobs = 1;
   std::uint64_t seed = 1;
   double timeout = 120.0;
-  bool oracle = false;
+  bool oracle = false, twin = false;
 };
 
 struct Task {
@@ -77,6 +79,10 @@ Plan read_plan(int count, char** list) {
     }
     if (word == "--oracle") {
       plan.oracle = true;
+      continue;
+    }
+    if (word == "--twin") {
+      plan.twin = true;
       continue;
     }
     if (i + 1 >= count) throw std::invalid_argument(word + " needs a value, or is unknown");
@@ -260,6 +266,15 @@ class Scratch {
   std::filesystem::path path;
 };
 
+/// What the program says of the same rig, day and noise with nothing hidden.
+std::string answer_to_twin(const Plan& plan, blind::Request request, const std::filesystem::path& folder) {
+  request.ids.clear();
+  request.ratio = 0;
+  blind::write_dataset(blind::make_dataset(request), folder / "twin");
+  return run_program({plan.program.string(), (folder / "twin").string(), "--json", "-"}, folder, plan.timeout)
+      .out;
+}
+
 std::string line_of(const Plan& plan, const Task& task) {
   const Scratch scratch;
   const blind::Dataset dataset = blind::make_dataset(task.request);
@@ -297,6 +312,8 @@ std::string line_of(const Plan& plan, const Task& task) {
   if (outcome) {
     json.field("exit", static_cast<double>(outcome->exit_code)).field("seconds", outcome->seconds);
     json.field("answer", outcome->out).field("error", outcome->err.substr(0, 500));
+    if (plan.twin && !task.request.ids.empty() && !task.left_out)
+      json.field("bare", answer_to_twin(plan, task.request, scratch.path));
   }
   if (baselines && baselines->exit_code == 0) {
     while (!baselines->out.empty() && baselines->out.back() == '\n') baselines->out.pop_back();

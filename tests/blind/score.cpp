@@ -92,9 +92,15 @@ Answer read_answer(const std::string& text) {
   return a;
 }
 
-/// Power on held-out runs that the answer took away, over the power that the true model would.
-double closed_share(const Truth& t, const Answer& a) {
+/// Power on held-out runs that the answer took away, over the power that the true model would: from where the baseline stood down to
+/// what the same program leaves of the same day with nothing hidden. Without that twin the generator's own baseline has to do.
+double closed_share(const Truth& t, const Answer& a, const std::map<std::string, double>& floor) {
   if (a.heldout_before <= 0.0 || t.gap.empty()) return -1.0;
+  const double taken = a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after;
+  if (const auto left = floor.find(a.signal); left != floor.end()) {
+    const double open = a.heldout_before * a.heldout_before - left->second * left->second;
+    return open < 0.02 * left->second * left->second ? -1.0 : taken / open;
+  }
   const std::string signal = a.signal == "motion" ? "balance" : a.signal == "torque" ? "driven" : a.signal;
   if (!t.gap.contains(signal)) return -1.0;
   const double gap = t.gap.at(signal), noise = t.gap_noise.at(signal);
@@ -103,7 +109,16 @@ double closed_share(const Truth& t, const Answer& a) {
   const auto closes = t.gap_closes.find(signal);
   const double true_closes = closes != t.gap_closes.end() ? closes->second : gap * gap;
   if (true_closes < 0.2 * gap * gap) return -1.0;  // the recordings' own noise hides it
-  return (a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after) / true_closes;
+  return taken / true_closes;
+}
+
+std::map<std::string, double> read_floor(const std::string& text) {
+  std::map<std::string, double> floor;
+  const json j = json::parse(text, nullptr, false);
+  if (!j.is_object() || !j.contains("disagreement")) return floor;
+  for (const json& signal : j["disagreement"].value("signals", json::array()))
+    if (const double left = number(signal, "heldout"); left > 0) floor[signal.value("signal", "")] = left;
+  return floor;
 }
 
 }  // namespace
@@ -123,6 +138,7 @@ Case read_case(const std::string& line) {
   } else {
     one.answer.failed = "not asked";
   }
+  if (j.contains("bare")) one.floor = read_floor(j["bare"].get<std::string>());
   if (j.contains("baselines") && j["baselines"].is_object())
     for (const auto& [method, answer] : j["baselines"].items()) {
       one.baselines[method] = read_answer(answer.dump());
@@ -149,7 +165,7 @@ Judgement judge_case(const Case& one) {
   for (const std::string& id : a.alternatives)
     if (!holds(set, id)) set.push_back(id);
   j.set_size = static_cast<int>(set.size());
-  j.closed = closed_share(t, a);
+  j.closed = closed_share(t, a, one.floor);
   j.left_unnamed = a.verdict == "unknown" && a.effects.empty();
   const bool one_name = a.verdict == "named" && a.effects.size() == 1 && a.alternatives.empty();
   j.asserted = a.verdict == "named" && !a.effects.empty() && a.alternatives.empty();

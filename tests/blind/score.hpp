@@ -37,6 +37,8 @@ struct Answer {
 struct Case {
   Truth truth;
   Answer answer;
+  /// By signal, as answers name them: rms on the held-out runs of the same day with nothing hidden, read and fitted by the same program.
+  std::map<std::string, double> floor = {};
   std::map<std::string, Answer> baselines = {};  ///< by the method's name, of the same dataset
 };
 

@@ -107,6 +107,18 @@ TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
   EXPECT_NEAR(judge_case(one).closed, 0.8, 1e-12);
 }
 
+TEST(Score, measures_the_closed_gap_against_the_same_day_with_nothing_hidden) {
+  Case one = single("creep");
+  one.answer = named({"creep"});
+  one.answer.signal = "torque";
+  one.answer.heldout_before = 0.05;
+  one.answer.heldout_after = 0.04;
+  one.floor = {{"torque", 0.03}, {"p1", 0.01}};
+  EXPECT_NEAR(judge_case(one).closed, (25.0 - 16.0) / (25.0 - 9.0), 1e-12);
+  one.answer.heldout_before = 0.0302;  // hardly above it: nothing to be measured by
+  EXPECT_EQ(judge_case(one).closed, -1.0);
+}
+
 TEST(Score, reads_a_line_of_results_and_survives_an_answer_that_is_none) {
   const std::string label =
       R"({"schema":"isac.blind/1","kind":"single","noise":"white","side":"process","signal":"torque",)"
@@ -116,6 +128,11 @@ TEST(Score, reads_a_line_of_results_and_survives_an_answer_that_is_none) {
   const Case one = read_case(R"({"key":"k","label":)" + label +
                              R"(,"exit":0,"seconds":1.5,"answer":"Segmentation fault"})");
   EXPECT_EQ(one.truth.nearest_equal, "hysteresis");
+  EXPECT_TRUE(one.floor.empty());
+  const Case twin = read_case(
+      R"({"key":"k","label":)" + label +
+      R"(,"bare":"{\"disagreement\":{\"signals\":[{\"signal\":\"p1\",\"heldout\":0.25},{\"signal\":\"p2\",\"heldout\":null}]}}"})");
+  EXPECT_EQ(twin.floor, (std::map<std::string, double>{{"p1", 0.25}}));
   EXPECT_FALSE(one.answer.failed.empty());
   EXPECT_NE(report({one}).find("without an answer: 1"), std::string::npos);
   EXPECT_THROW(read_case("nonsense"), std::runtime_error);

@@ -78,6 +78,26 @@ const char* to_string(Verdict verdict) noexcept {
 
 namespace {
 
+/// The baseline as anyone would fit it, by plain least squares and without tolerances. (What fits beside effects has them.)
+ModelPoint plain_baseline(const Predictor& predictor, const Found& found) {
+  Weights plain = found.weights;
+  for (Colour& colour : plain.colour) colour = {};
+  plain.filter.reset();
+  return fit_baseline(predictor, {}, plain, false).model;
+}
+
+void fill_heldout(const Predictor& predictor, const Found& found, const Proof& proof,
+                  std::vector<SignalGap>& signals) {
+  if (proof.runs() == 0) return;
+  const ModelPoint plain = plain_baseline(predictor, found);
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
+    if (!predictor.data().has(chain)) continue;
+    const Label label = label_of(predictor.data(), chain);
+    for (SignalGap& gap : signals)
+      if (gap.signal == label.signal) gap.heldout = label.scale * proof.residual(plain, chain).rms();
+  }
+}
+
 void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof, Chain chain,
               const BaselineModel& baseline, Gap& gap) {
   const bool pressure = chain == Chain::kPressure1 || chain == Chain::kPressure2;
@@ -87,12 +107,7 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
                : chain == Chain::kPressure1 ? "p1"
                                             : "p2";
   gap.unit = chain == Chain::kTorque ? baseline.output_unit : pressure ? "kg/cm2" : "N m";
-  // Before: the baseline as anyone would fit it, by plain least squares and without tolerances. (What fits beside effects has them.)
-  Weights plain = found.weights;
-  for (Colour& colour : plain.colour) colour = {};
-  plain.filter.reset();
-  const ModelPoint user =
-      found.added.empty() ? found.baseline.model : fit_baseline(predictor, {}, plain, false).model;
+  const ModelPoint user = found.added.empty() ? found.baseline.model : plain_baseline(predictor, found);
   gap.before = scale * raw_residual(predictor, user, chain).rms();
   gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
   gap.noise_floor = scale * (chain == Chain::kMotion ? found.weights.sigma[static_cast<int>(chain)]
@@ -208,6 +223,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
            std::any_of(e.rejected.begin(), e.rejected.end(), is);
   });
   describe(predictor, library, found, proof, options, e);
+  fill_heldout(predictor, found, proof, e.signals);
   return e;
 }
 

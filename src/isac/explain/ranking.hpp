@@ -24,7 +24,7 @@ struct Trial {
   Eigen::VectorXd residual;  ///< weighted, all rows; of the refit, with the model's parameters eliminated
   double loss = 0;
   Comparison behind;    ///< of the best trial
-  double weight = 0;    ///< share of belief among the trials
+  double weight = 0;    ///< share of belief among the trials and what is none of them
   double material = 0;  ///< rms of what it explains over the floor of the chain where it shows most
   bool in_set = false;
 };
