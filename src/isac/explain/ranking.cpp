@@ -12,7 +12,7 @@ namespace {
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 
-// Chance that what is missing is none of the catalogue though one of it fits: 2 of 49 single names on unseen blind datasets were wrong
+// Chance that what is missing is none of the catalogue though one of it fits: 1 of 48 single names on unseen blind datasets was wrong
 // (docs/explain.md), and what a rig may have is more than what the generator hides.
 constexpr double kNotOfTheCatalogue = 0.03;
 
