@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -173,6 +174,37 @@ TEST(RawEffects, names_hum_and_spikes_that_the_low_passed_rows_cannot_show) {
   EXPECT_NEAR(find("spikes")->parameters[0].value, 0.5 / 731, 1e-4);
   EXPECT_LT(e.gap.heldout_after, e.gap.heldout_before);
   EXPECT_NEAR(e.gap.heldout_after, 0.019 * std::sqrt(2.0) * 0.3, 0.0006);  // the forces' noise alone, and 7 %
+}
+
+TEST(RawEffects, calls_a_valve_that_hunts_no_disturbance_from_outside) {
+  TiedRig rig;
+  auto runs = test::record_all(rig, fitted_runs()),
+       held = test::record_all(rig, {by_hand(15, 0.45, 1.0)}, 60);
+  double phase = 0;
+  for (auto* all : {&runs, &held})
+    for (series::Recording& run : *all) {
+      phase += 2.1;
+      for (std::size_t k = 0; k < run.columns[0].values.size(); ++k) {
+        // Both pressures swing, and the torque with them.
+        const double turn = 6.283185307179586 * 2.3 * run.columns[0].values[k] + phase,
+                     size = 0.006 * kPascalPerKgfCm2;
+        const double p1 = size * std::sin(turn), p2 = size * std::sin(turn + 1.7);
+        run.columns[2].values[k] += p1;
+        run.columns[3].values[k] += p2;
+        const double force = 0.5 * rig.B * 0.5 * (p2 - p1);
+        run.columns[6].values[k] -= force;
+        run.columns[7].values[k] += force;
+      }
+    }
+  const Explanation e = explain(runs, HeldOut(held), options_for(rig));
+  ASSERT_EQ(to_string(e.verdict), std::string("unknown"));
+  EXPECT_TRUE(e.effects.empty());
+  EXPECT_EQ(e.unknown->subsystem, "pcu");
+  EXPECT_EQ(e.unknown->depends_on, std::vector<std::string>{"time"});
+  const auto line = std::find_if(e.where.begin(), e.where.end(),
+                                 [](const auto& region) { return region.variable == "frequency"; });
+  ASSERT_NE(line, e.where.end());
+  EXPECT_NEAR(line->low, 2.3, 0.02);
 }
 
 TEST(ChangeSentence, tells_the_change_and_what_it_had_stood_in_for) {

@@ -6,6 +6,8 @@
 #include <random>
 #include <type_traits>
 
+#include "isac/explain/explain.hpp"
+#include "isac/explain/generic_fit.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/screen.hpp"
 #include "isac/explain/search.hpp"
@@ -231,6 +233,54 @@ TEST(Explain, names_dry_friction_and_shrinks_the_gap_on_runs_it_never_saw) {
               0.0015);  // 5 %: ten times its standard error here
   const auto beyond_floor = [&](double rms) { return rms * rms - e.gap.noise_floor * e.gap.noise_floor; };
   EXPECT_LT(beyond_floor(e.gap.heldout_after), 0.1 * beyond_floor(e.gap.heldout_before));
+}
+
+TEST(Explain, leaves_a_damping_by_the_root_of_the_speed_without_a_name) {
+  const test::TiedRig rig;
+  auto runs = test::record_all(rig, small_day());
+  for (series::Recording& run : runs) {
+    const std::vector<double> speed = low_pass_derivative(run.columns[1].values, 6, 0.002, 1);
+    for (std::size_t k = 0; k < speed.size(); ++k) {
+      if (run.metadata.at("experiment") != "constant-pressure") break;
+      const double drag = 0.04 * std::copysign(std::sqrt(std::abs(speed[k])), speed[k]) / rig.radius;
+      run.columns[6].values[k] += 0.5 * drag;
+      run.columns[7].values[k] -= 0.5 * drag;
+    }
+  }
+  const Explanation e =
+      explain(runs, HeldOut(), {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  ASSERT_EQ(to_string(e.verdict), std::string("unknown")) << first_of(e);
+  EXPECT_EQ(e.unknown->subsystem, "muscle");
+  EXPECT_NE(std::find(e.unknown->depends_on.begin(), e.unknown->depends_on.end(), "velocity"),
+            e.unknown->depends_on.end());
+}
+
+TEST(GenericFit, stands_beside_a_name_that_is_right_and_before_one_that_is_not) {
+  const test::TiedRig rig{.dry = 0.03};
+  Prepared data = prepare(test::record_all(rig, small_day()), rig.facts(), {}, 4.0);
+  const Library library = make_library(data);
+  const Predictor predictor(data);
+  Weights weights;
+  for (double& sigma : weights.sigma) sigma = 150;  // Pa
+  weights.sigma[0] = weights.sigma[3] = 0.003;
+  const Fit fit = fit_baseline(predictor, library.tolerances, weights);
+  const Around place = around(predictor, fit, weights);
+  const Screen seen = screen(place, library, {.flips = 199, .dictionary = true});
+  const GenericFit generic = fit_generic(place, seen);
+  ASSERT_FALSE(generic.functions.empty());
+  EXPECT_EQ(generic.chain, Chain::kTorque);
+  EXPECT_NEAR(generic.residual.squaredNorm(), place.residual.squaredNorm() - generic.gain,
+              1e-6 * place.residual.squaredNorm());
+  const auto behind = [&](const char* id) {
+    for (const Screened& c : seen.candidates) {
+      const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(c.hypothesis)];
+      if (h.id() != id) continue;
+      return behind_generic(data, refine(place, h, c.start).residual, h.parameters(), generic).t;
+    }
+    return std::nan("");
+  };
+  EXPECT_LT(behind("coulomb_friction"), 1.0);
+  EXPECT_GT(behind("quadratic_damping"), 3.0);
 }
 
 TEST(Explain, answers_the_same_whatever_the_order_of_the_runs) {

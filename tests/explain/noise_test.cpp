@@ -131,6 +131,80 @@ TEST(Colour, is_read_off_a_residual) {
   EXPECT_LE(wandering, 1);  // three standard errors
 }
 
+TEST(Colour, finds_a_zero_that_wanders_by_a_fifth_of_the_rows_noise) {
+  const Prepared data = rows_of_runs(6, 5600, 0);
+  int found = 0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    const Colour zero = colour_of(data, noise(data, 1.0, 0.0, 0.1, 0.04, 200 + seed), Chain::kTorque);
+    found += zero.wander > 0.04 / 5 && zero.wander < 0.04 * 5 ? 1 : 0;
+  }
+  EXPECT_GE(found, 10);
+}
+
+/// There and back at speeds between 0.12 and 0.4 rad/s with round corners, as an encoder of 8000 steps reads it; the true velocity beside it.
+struct Stroke {
+  std::vector<double> angle, velocity;
+};
+Stroke stroke(double start, double seconds) {
+  Stroke s;
+  double angle = start, pushed = 0, velocity = 0;
+  const double step = 2 * kPi / 8000;
+  for (double t = 0; t < seconds; t += 1e-4) {
+    const double speed = 0.12 + 0.07 * (static_cast<int>(t / 4.0) % 5);
+    const double wanted = std::fmod(t, 4.0) < 2.0 ? speed : -speed;
+    pushed += 1e-4 / 0.03 * (wanted - pushed);  // a hand does not jump in acceleration
+    velocity += 1e-4 / 0.03 * (pushed - velocity);
+    angle += 1e-4 * velocity;
+    if (s.angle.size() * 0.002 > t + 5e-5) continue;
+    s.angle.push_back(step * (std::floor(angle / step) + 0.5));
+    s.velocity.push_back(velocity);
+  }
+  return s;
+}
+
+TEST(QuietVelocity, does_not_pass_an_encoders_steps_for_less_damping_and_some_friction) {
+  // T = −D φ̇ fitted by φ̇ and sgn φ̇ as they are read: with φ̇ noisy the first is too small, and the second takes what it lacks.
+  const double step = 2 * kPi / 8000;
+  double narrow = 0, quiet = 0;
+  constexpr int kStarts = 8;
+  for (int start = 0; start < kStarts; ++start) {
+    const Stroke s = stroke(0.37 * start * step, 60);
+    const std::vector<double> truth = low_pass(s.velocity, 3);
+    const auto friction_of = [&](const std::vector<double>& v) {
+      double vv = 0, vs = 0, ss = 0, yv = 0, ys = 0;
+      for (std::size_t k = 100; k + 100 < v.size(); ++k) {
+        const double sign = truth[k] > 0.02 ? 1 : truth[k] < -0.02 ? -1 : 0;
+        vv += v[k] * v[k], vs += v[k] * sign, ss += sign * sign, yv += truth[k] * v[k], ys += truth[k] * sign;
+      }
+      return (ys * vv - yv * vs) / (ss * vv - vs * vs);  // rad/s that the sign stands for
+    };
+    narrow += friction_of(low_pass_derivative(s.angle, 3, 0.002, 1)) / kStarts;
+    quiet += friction_of(quiet_velocity(s.angle, 3, 0.002, step)) / kStarts;
+  }
+  EXPECT_GT(narrow, 1e-3);
+  EXPECT_LT(std::abs(quiet),
+            0.5 * narrow);  // at some speeds the steps beat with the samples: slow, and no kernel helps
+}
+
+TEST(QuietVelocity, follows_a_quick_motion_as_the_narrow_kernel_does) {
+  const double step = 2 * kPi / 8000, turn = 2 * kPi * 4;
+  std::vector<double> angle, exact;
+  for (int k = 0; k < 5000; ++k) {
+    const double t = 0.002 * k;
+    angle.push_back(step * (std::floor(0.4 * std::sin(turn * t) / step) + 0.5));
+    exact.push_back(0.4 * turn * std::cos(turn * t) * std::exp(-0.5 * turn * turn * 0.006 * 0.006));
+  }
+  const std::vector<double> quiet = quiet_velocity(angle, 3, 0.002, step),
+                            narrow = low_pass_derivative(angle, 3, 0.002, 1);
+  double quiet2 = 0, narrow2 = 0;
+  for (std::size_t k = 100; k + 100 < exact.size(); ++k) {
+    quiet2 += (quiet[k] - exact[k]) * (quiet[k] - exact[k]);
+    narrow2 += (narrow[k] - exact[k]) * (narrow[k] - exact[k]);
+  }
+  EXPECT_LT(quiet2, 1.2 * narrow2);
+  EXPECT_EQ(quiet_velocity(angle, 3, 0.002, std::nan("")), narrow);
+}
+
 /// Runs of the tied rig whose pressure readings carry slow noise, felt by the torque or not.
 std::vector<series::Recording> with_slow_pressure_noise(bool felt) {
   const test::TiedRig rig;

@@ -1,4 +1,4 @@
-// The tests of a screen where few blocks carry an effect.
+// The tests of a screen: where few blocks carry an effect, and where whole runs share their zero.
 #include "isac/explain/screen.hpp"
 
 #include <gtest/gtest.h>
@@ -77,6 +77,64 @@ TEST(Judge, few_blocks_that_agree_are_significant_although_they_are_their_own_ya
     EXPECT_LT(screen.columns[0].T, std::sqrt(1.0 * kCarry) + 1e-9);  // below any limit of a whole search
     EXPECT_LT(screen.rare_p, 1e-4);
   }
+}
+
+constexpr unsigned kRuns = 10;
+
+/// A response that rests within its runs, beside noise of its blocks and a zero of each run.
+Screen resting_screen(double effect, double zero, double resting, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Screen screen;
+  Column c;
+  c.hypothesis = 0;
+  c.resting = resting;
+  c.atom_norm = Eigen::VectorXd::Ones(kBlocks);
+  c.atom_score = Eigen::VectorXd::Zero(kBlocks);
+  for (Eigen::Index run = 0; run < kRuns; ++run) {
+    const double of_run = zero * normal(random);
+    for (Eigen::Index b = 0; b < static_cast<Eigen::Index>(kBlocks / kRuns); ++b)
+      c.atom_score[run * static_cast<Eigen::Index>(kBlocks / kRuns) + b] = effect + of_run + normal(random);
+  }
+  c.norm2 = c.chain_norm2[0] = kBlocks;
+  c.score = c.atom_score.sum();
+  screen.columns.push_back(c);
+  return screen;
+}
+
+Setting setting_of_runs() {
+  Setting setting;
+  setting.data.runs.assign(kRuns, setting.data.runs.front());
+  for (Row& row : setting.data.rows) row.run = row.block / (kBlocks / kRuns);
+  return setting;
+}
+
+TEST(Judge, takes_no_zero_that_moves_between_runs_for_what_rests_within_them) {
+  const Setting setting = setting_of_runs();
+  std::mt19937_64 random(7);
+  constexpr int kDraws = 2000;
+  int by_runs = 0, by_blocks = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    for (const double resting : {1.0, 0.0}) {
+      Screen screen = resting_screen(0, 1.0, resting, random);
+      judge(screen, setting.data, setting.library, {.flips = 19});
+      (resting > 0 ? by_runs : by_blocks) += screen.columns[0].T > 1.96 ? 1 : 0;
+    }
+  }
+  EXPECT_LE(by_runs, 0.065 * kDraws);  // three standard errors above 5 %
+  EXPECT_GE(by_runs, 0.02 * kDraws);
+  EXPECT_GE(by_blocks, 0.3 * kDraws);  // what blocks alone would make of it
+}
+
+TEST(Judge, still_sees_what_rests_within_runs_where_the_runs_agree) {
+  const Setting setting = setting_of_runs();
+  std::mt19937_64 random(8);
+  int seen = 0;
+  for (int i = 0; i < 200; ++i) {
+    Screen screen = resting_screen(1.0, 0.0, 1.0, random);
+    judge(screen, setting.data, setting.library, {.flips = 19});
+    seen += screen.columns[0].T > 4 ? 1 : 0;
+  }
+  EXPECT_GE(seen, 190);
 }
 
 }  // namespace

@@ -18,6 +18,9 @@ TEST(Statistics, orders_and_spreads_skip_missing_samples) {
 TEST(Statistics, tail_probabilities_are_those_of_the_tables) {
   EXPECT_NEAR(student_t_limit(0.95, 10), 2.228139, 1e-6);
   EXPECT_NEAR(student_t_limit(0.95, 1e9), 1.959964, 1e-6);
+  EXPECT_NEAR(normal_two_sided_limit(0.05), 1.959964, 1e-6);
+  EXPECT_NEAR(normal_two_sided_limit(1e-20), 9.3363, 1e-3);  // 1 − p is 1 there
+  EXPECT_TRUE(std::isnan(normal_two_sided_limit(0)));
   EXPECT_NEAR(student_t_two_sided(2.228139, 10), 0.05, 1e-7);
   EXPECT_NEAR(chi_square_upper(18.307038, 10), 0.05, 1e-8);
 }

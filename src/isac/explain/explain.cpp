@@ -126,6 +126,7 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
   for (Candidate& c : e.alternatives) e.rejected.push_back(c);
+  for (Candidate& c : e.rejected) c.confidence = 0;  // nearest, and still ruled out
   e.effects.clear();
   e.alternatives.clear();
   e.gap.after = e.gap.before;

@@ -154,7 +154,7 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
   } else {
     const double sigma = data_->smoothing.torque / dt;
     in.own_angle = low_pass(truth, sigma);
-    in.own_velocity = low_pass_derivative(truth, sigma, dt, 1);
+    in.own_velocity = quiet_velocity(truth, sigma, dt, data_->rig.angle_step);
     in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
     if (slow) in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
   }

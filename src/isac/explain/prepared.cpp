@@ -18,9 +18,9 @@ namespace {
 constexpr double kKernelReach =
     6.0;                          // standard deviations: what is cut off the second derivative is below 1e-6
 constexpr double kRowRate = 125;  // Hz: beyond it the kernel has left nothing
-constexpr double kSlowestStep = 0.05;    // s per encoder step: slower is standing still
 constexpr double kTurningWindow = 0.08;  // s to either side
 constexpr double kWideKernel = 0.020;    // s, for velocities that the encoder resolves badly
+constexpr double kQuietKernel = 0.015;   // s, for velocities that change slowly
 constexpr double kSlack = 2.0,
                  kCarries = 20.0;  // N: a sensor that carries this much as a rule and reads less hangs slack
 constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
@@ -91,14 +91,17 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   run.is_free = run.experiment == "free" || run.experiment == "closed-loop";
   const std::vector<double>& time = recording.column("time").values;
   if (time.size() < 100) return run;
-  const double dt = series::median_interval(time);
-  run.interval = dt;
-  const auto n = static_cast<std::size_t>(std::floor((time.back() - time.front()) / dt + 1.5));
+  const double middle = series::median_interval(time);
+  const auto n = static_cast<std::size_t>(std::floor((time.back() - time.front()) / middle + 1.5));
   if (n < 100 || n > 100 * time.size()) return run;
-  // A clock that keeps its step within a tenth of it needs no resampling.
+  // A clock that keeps its step within a quarter of it needs no resampling. Where it is read with some scatter, its mean step is better known
+  // than its middle one, and φ̈ needs it twice.
+  const double mean = (time.back() - time.front()) / static_cast<double>(n - 1);
   bool even = n == time.size();
   for (std::size_t k = 0; even && k < n; ++k)
-    even = std::abs(time[k] - time.front() - static_cast<double>(k) * dt) < 0.25 * dt;
+    even = std::abs(time[k] - time.front() - static_cast<double>(k) * mean) < 0.25 * mean;
+  const double dt = even ? mean : middle;
+  run.interval = dt;
   run.time.resize(n);
   for (std::size_t k = 0; k < n; ++k)
     run.time[k] = even ? time[k] - time.front() : static_cast<double>(k) * dt;
@@ -115,9 +118,10 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   const double sigma = smoothing.torque / dt;
   if (!run.raw_angle.empty()) {
     run.angle = low_pass(run.raw_angle, sigma);
-    run.velocity = low_pass_derivative(run.raw_angle, sigma, dt, 1);
+    const std::vector<double> velocity = low_pass_derivative(run.raw_angle, sigma, dt, 1);
+    run.velocity = quiet_velocity(run.raw_angle, sigma, dt, rig.angle_step);
     run.acceleration = low_pass_derivative(run.raw_angle, sigma, dt, 2);
-    run.dry_velocity = dry_velocity(run.raw_angle, run.velocity, dt, rig.angle_step);
+    run.dry_velocity = dry_velocity(run.raw_angle, velocity, dt, rig.angle_step);
   }
   std::vector<double> p1 = take("p1"), p2 = take("p2");
   if (!p1.empty() && !p2.empty()) {
@@ -335,6 +339,29 @@ std::vector<double> low_pass_derivative(std::span<const double> x, double sigma,
   const double scale = order == 1 ? 1 / interval : 1 / (interval * interval);
   std::vector<double> out(x.size());
   for (std::size_t i = 0; i < x.size(); ++i) out[i] = scale * centred_sum(g, x, i);
+  return out;
+}
+
+std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma, double interval,
+                                   double angle_step) {
+  std::vector<double> out = low_pass_derivative(raw_angle, sigma, interval, 1);
+  const double wide_sigma = kQuietKernel / interval;
+  if (!(std::isfinite(angle_step) && angle_step > 0) || wide_sigma <= sigma) return out;
+  // w + (1 − σ²/σ_w²) (w − g_w ∗ w), w = g_w′ ∗ φ, has the second moment of g: a smooth motion passes it as it passes g′.
+  const std::vector<double> wide = low_pass_derivative(raw_angle, wide_sigma, interval, 1),
+                            wider = wide_low_pass(wide, wide_sigma);
+  const double bend = 1 - sigma * sigma / (wide_sigma * wide_sigma);
+  std::vector<double> slow(wide.size()), difference(wide.size());
+  for (std::size_t k = 0; k < slow.size(); ++k) {
+    slow[k] = wide[k] + bend * (wide[k] - wider[k]);
+    difference[k] = (out[k] - slow[k]) * (out[k] - slow[k]);
+  }
+  const std::vector<double> power = wide_low_pass(difference, 2 * wide_sigma);
+  double gain = 0;  // of white noise by g′
+  for (const double g : gaussian(std::max(sigma, 1.0), 1)) gain += g * g;
+  const double expected = angle_step * angle_step / 12 * gain / (interval * interval);
+  for (std::size_t k = 0; k < slow.size(); ++k)
+    out[k] = slow[k] + std::clamp((power[k] / expected - 1.5) / 1.5, 0.0, 1.0) * (out[k] - slow[k]);
   return out;
 }
 

@@ -42,7 +42,8 @@ struct BaselineModel {
 
 enum class Chain : unsigned char { kTorque = 0, kPressure1 = 1, kPressure2 = 2, kMotion = 3 };
 inline constexpr int kChains = 4;
-inline constexpr double kAtomSeconds = 2.0;  ///< the shortest block
+inline constexpr double kAtomSeconds = 2.0;   ///< the shortest block
+inline constexpr double kSlowestStep = 0.05;  ///< s per encoder step: slower is standing still
 
 struct PreparedRun {
   bool recorded = true;  ///< false: planned, its signals are a model's
@@ -133,6 +134,10 @@ void cut_blocks(Prepared& data, double block_seconds);
 /// (g′ ∗ x)/Δt and (g″ ∗ x)/Δt².
 [[nodiscard]] std::vector<double> low_pass_derivative(std::span<const double> x, double sigma_samples,
                                                       double interval, int order);
+/// g′ ∗ φ, and a wider kernel without its bend where what the two differ by is the encoder's steps: damping times their noise would pass
+/// for less damping, and what D φ̇ then lacks for friction. (No step known: g′ ∗ φ.)
+[[nodiscard]] std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma_samples,
+                                                 double interval, double angle_step);
 /// Velocity that can be told from standing still; see the head of this file.
 [[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle,
                                                std::span<const double> velocity, double interval,

@@ -27,8 +27,6 @@ std::string Ranking::id_of(const Trial& t) const {
 
 bool Ranking::is_limit_case(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
-  // Friction that is less at rest than in motion is no Stribeck friction: it mends how a turn was seen.
-  if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] <= t.values[0]) return true;
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const auto& parameter = h.info().parameters[i];
@@ -37,7 +35,11 @@ bool Ranking::is_limit_case(const Trial& t) const {
     const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
                  high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
     if (t.values[k] <= low || t.values[k] >= high) return true;
+    // Narrower, or slower, than an encoder tells.
     if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
+      return true;
+    if (h.dry && std::string_view(parameter.unit) == "rad/s" &&
+        t.values[k] < 2 * data_.rig.angle_step / kSlowestStep)
       return true;
   }
   return false;

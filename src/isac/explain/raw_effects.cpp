@@ -161,6 +161,46 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
   return all;
 }
 
+/// A line that stands in the pressures and not in what was asked of them: a valve that hunts. The catalogue has no name for it, and what the
+/// torque shows of it is no disturbance from outside.
+bool valve_hunts(const Predictor& predictor, const ModelPoint& model, const Found& found,
+                 const ExplainOptions& options, Explanation& e) {
+  const Prepared& data = predictor.data();
+  SpectralLine strongest;
+  Chain chain = Chain::kPressure1;
+  for (const Chain side : {Chain::kPressure1, Chain::kPressure2}) {
+    if (!data.has(side)) continue;
+    for (const SpectralLine& line : spectral_lines(predictor, model, side, options.significance / kLooks)) {
+      if (line.frequency >= kMainsLow || line.rms <= strongest.rms) continue;
+      strongest = line;
+      chain = side;
+    }
+  }
+  const double floor = found.floors.white[static_cast<int>(chain)];
+  if (!(strongest.rms >= options.material * floor)) return false;
+  const Label label = label_of(data, chain);
+  e.verdict = Verdict::kUnknown;
+  e.detected = true;
+  e.p_value = std::min(e.p_value, strongest.p_value);
+  Unknown unknown;
+  unknown.subsystem = "pcu";
+  unknown.signal = label.signal;
+  unknown.unit = label.unit;
+  unknown.depends_on = {"time"};
+  unknown.variable = "time";
+  unknown.variable_unit = "s";
+  unknown.share = strongest.share;
+  e.unknown = std::move(unknown);
+  e.where.push_back(
+      {"pcu", label.signal, "frequency", strongest.frequency, strongest.frequency, "Hz", strongest.share});
+  e.trials.push_back(
+      {"periodic_disturbance",
+       fmt::format("ruled out: the pressure itself swings at {} Hz, {} {} in amplitude, and its command does "
+                   "not; a valve that hunts",
+                   rounded(strongest.frequency, 4), rounded(label.scale * strongest.amplitude), label.unit)});
+  return true;
+}
+
 double less(double rms, double mean_square) {
   return std::isfinite(rms) ? std::sqrt(std::max(0.0, rms * rms - mean_square)) : rms;
 }
@@ -177,6 +217,7 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
                      const ExplainOptions& options, Explanation& e) {
   if (e.verdict == Verdict::kUnknown) return;
   const ModelPoint& model = e.effects.empty() ? found.baseline.model : found.model.model;
+  if (e.effects.empty() && valve_hunts(predictor, model, found, options, e)) return;
   std::vector<RawEffect> effects = look(predictor, model, options);
   std::stable_sort(effects.begin(), effects.end(),
                    [](const RawEffect& a, const RawEffect& b) { return a.rms > b.rms; });

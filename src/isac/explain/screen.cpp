@@ -4,28 +4,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
-#include <limits>
-#include <map>
-#include <numeric>
-#include <random>
 #include <thread>
 #include <utility>
-
-#include "isac/series/statistics.hpp"
 
 namespace isac::explain {
 namespace {
 
-constexpr double kCarryingBlocks = 8;
 constexpr double kMimicked = 1e-5;  // of a response's squares left by the projection: all of it is mimicked
-// T cannot pass the square root of the blocks that carry a column: with fewer than these, and most of the chain elsewhere, it has
-// no power in a whole search.
-constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
-// And with fewer than these it can pass a whole search's limit, about 4, only if they all agree.
-constexpr double kBoundingBlocks = 25;
-constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
-constexpr int kBlocksElsewhere = 20;
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
@@ -82,77 +67,26 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
   return best;
 }
 
-/// p-value of a score whose own part is taken out of its scatter: t = Σ g / √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n.
-double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, double carried_by) {
-  if (!(carried_by > 2)) return 1;  // no freedom is left
-  const double all = norm2.sum(), amplitude = score.sum() / all;
-  const Eigen::ArrayXd left = (score - amplitude * norm2).array() / (1 - (norm2.array() / all).min(0.99));
-  const double scatter = std::sqrt(left.square().sum());
-  return scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / scatter, carried_by - 1) : 1.0;
+/// Share of Σ x² that the means of runs (of each chain) hold.
+double held_by_runs(const Prepared& data, const Eigen::VectorXd& x) {
+  double held = 0, sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    sum += x[static_cast<Eigen::Index>(i)];
+    ++count;
+    if (i + 1 < data.rows.size() && data.rows[i + 1].run == data.rows[i].run &&
+        data.rows[i + 1].chain == data.rows[i].chain)
+      continue;
+    held += sum * sum / static_cast<double>(count);
+    sum = 0;
+    count = 0;
+  }
+  const double all = x.squaredNorm();
+  return all > 0 ? held / all : 0.0;
 }
 
 struct Task {
   int hypothesis, shape;
-};
-
-/// What scores of any function of the signals scatter, chain by chain, in blocks that a column does not live in.
-class Elsewhere {
- public:
-  Elsewhere(const std::vector<Column>& columns,
-            const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& joined,
-            std::vector<std::vector<char>> there)
-      : there_(std::move(there)) {
-    for (const Column& c : columns) {
-      if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
-      Functions& f = chains_[static_cast<int>(c.chain)];
-      f.score2.push_back(joined(c.atom_score).cwiseAbs2());
-      f.norm2.push_back(joined(c.atom_norm));
-    }
-  }
-
-  struct Scatter {
-    double largest =
-        0;  ///< variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell
-    int blocks = 0;  ///< that it was measured in
-  };
-  Scatter scatter(int chain, const Eigen::VectorXd& own_norm2) const {
-    std::vector<Eigen::Index> order(static_cast<std::size_t>(own_norm2.size()));
-    std::iota(order.begin(), order.end(), Eigen::Index{0});
-    std::sort(order.begin(), order.end(),
-              [&](Eigen::Index a, Eigen::Index b) { return own_norm2[a] > own_norm2[b]; });
-    std::vector<char> own(order.size(), 0);
-    double held = 0;
-    const double all = own_norm2.sum();
-    for (const Eigen::Index b : order) {
-      if (held >= kHeldByThem * all) break;
-      held += own_norm2[b];
-      own[static_cast<std::size_t>(b)] = 1;
-    }
-    Scatter found;
-    const Functions& f = chains_[chain];
-    for (std::size_t k = 0; k < f.score2.size(); ++k) {
-      double score2 = 0, norm2 = 0;
-      int blocks = 0;
-      for (Eigen::Index b = 0; b < own_norm2.size(); ++b) {
-        if (own[static_cast<std::size_t>(b)] != 0 ||
-            there_[static_cast<std::size_t>(chain)][static_cast<std::size_t>(b)] == 0)
-          continue;
-        score2 += f.score2[k][b];
-        norm2 += f.norm2[k][b];
-        ++blocks;
-      }
-      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum() && score2 > found.largest * norm2)
-        found = {score2 / norm2, blocks};
-    }
-    return found;
-  }
-
- private:
-  struct Functions {
-    std::vector<Eigen::VectorXd> score2, norm2;  // of blocks
-  };
-  Functions chains_[kChains];
-  std::vector<std::vector<char>> there_;  ///< by chain and block: has it rows there?
 };
 
 struct Done {
@@ -182,39 +116,6 @@ Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
   return q;
 }
 
-FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double significance) {
-  const Eigen::Index blocks = scores.rows(), columns = scores.cols();
-  Eigen::MatrixXd scaled = scores;
-  for (Eigen::Index j = 0; j < columns; ++j) {
-    const double norm = scaled.col(j).norm();
-    if (norm > 0) scaled.col(j) /= norm;
-  }
-  const double observed = columns > 0 ? scaled.colwise().sum().cwiseAbs().maxCoeff() : 0.0;
-  std::vector<double> all;
-  all.reserve(static_cast<std::size_t>(flips));
-  std::mt19937_64 random(seed);
-  int reached = 1;
-  constexpr Eigen::Index kAtOnce = 128;
-  for (int done = 0; done < flips; done += kAtOnce) {
-    const Eigen::Index now = std::min<Eigen::Index>(kAtOnce, flips - done);
-    Eigen::MatrixXd signs(now, blocks);
-    for (Eigen::Index i = 0; i < now; ++i)
-      for (Eigen::Index b = 0; b < blocks; b += 64) {
-        std::uint64_t bits = random();
-        for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1)
-          signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
-      }
-    const Eigen::VectorXd largest = (signs * scaled).cwiseAbs().rowwise().maxCoeff();
-    all.insert(all.end(), largest.data(), largest.data() + largest.size());
-    reached += static_cast<int>((largest.array() >= observed * (1 - 1e-12)).count());
-  }
-  FlipTest test;
-  test.statistic = observed;
-  test.p_value = static_cast<double>(reached) / static_cast<double>(flips + 1);
-  test.limit = series::quantile(all, 1 - significance);
-  return test;
-}
-
 Screen screen(const Around& place, const Library& library, const ScreenOptions& options) {
   const Predictor& predictor = *place.predictor;
   const Prepared& data = predictor.data();
@@ -234,6 +135,7 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
       column.atom_norm[b] += x[i] * x[i];
       column.chain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] += x[i] * x[i];
     }
+    column.resting = held_by_runs(data, x);
     const Eigen::VectorXd plain = unfiltered(data, *place.weights, x);
     for (Eigen::Index i = 0; i < n; ++i)
       column.plain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] +=
@@ -357,103 +259,6 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   }
   judge(result, data, library, options);
   return result;
-}
-
-void judge(Screen& result, const Prepared& data, const Library& library, const ScreenOptions& options) {
-  const auto blocks = static_cast<Eigen::Index>(data.blocks);
-  const auto joined = [&](const Eigen::VectorXd& atoms) {
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(blocks);
-    for (Eigen::Index a = 0; a < atoms.size(); ++a)
-      sum[data.block_of_atom[static_cast<std::size_t>(a)]] += atoms[a];
-    return sum;
-  };
-  // Scatter of a score per unit of norm, and how many blocks carry it. A column that few blocks of its chain carry takes the
-  // largest scatter that any function of the signals has elsewhere: slow noise scatters slow columns most. Where there is too
-  // little elsewhere, nothing can be said of it.
-  std::vector<double> units;
-  double chain_blocks[kChains] = {};
-  std::vector<std::vector<char>> seen(kChains, std::vector<char>(static_cast<std::size_t>(blocks), 0));
-  for (const Row& row : data.rows) seen[static_cast<std::size_t>(row.chain)][row.block] = 1;
-  for (int c = 0; c < kChains; ++c)
-    chain_blocks[c] = static_cast<double>(
-        std::count(seen[static_cast<std::size_t>(c)].begin(), seen[static_cast<std::size_t>(c)].end(), 1));
-  const auto chains_of = [&](const Column& c) {
-    return c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
-                             : bit(c.chain);
-  };
-  for (Column& c : result.columns) {
-    c.T = 0;
-    c.rare_p = 1;
-    if (c.norm2 <= 0) continue;
-    const double scatter2 = joined(c.atom_score).squaredNorm();
-    c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
-    c.unit = scatter2 / c.norm2;
-    c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
-    if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
-  }
-  if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
-  Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
-  double rare_columns = 0;
-  const Elsewhere elsewhere(result.columns, joined, std::move(seen));
-  for (std::size_t k = 0; k < result.columns.size(); ++k) {
-    Column& c = result.columns[k];
-    scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
-    double most = 0;
-    for (int chain = 0; chain < kChains; ++chain)
-      if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
-    if (c.norm2 <= 0 || c.hypothesis < 0 || c.carried_by >= kBoundingBlocks) continue;
-    const Eigen::VectorXd own = joined(c.atom_norm);
-    if (c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most)) {
-      double unit = 1;
-      int seen_in = static_cast<int>(blocks);
-      for (int chain = 0; chain < kChains; ++chain) {
-        if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
-        const Elsewhere::Scatter there = elsewhere.scatter(chain, own);
-        unit = std::max(unit, there.blocks > 0 ? there.largest : std::numeric_limits<double>::infinity());
-        seen_in = std::min(seen_in, there.blocks);
-      }
-      if (std::isfinite(unit))
-        c.rare_p = series::student_t_two_sided(std::abs(c.score) / std::sqrt(unit * c.norm2), seen_in);
-    } else {
-      c.rare_p = jackknife_p(scores.col(static_cast<Eigen::Index>(k)), own, c.carried_by);
-    }
-    ++rare_columns;
-  }
-  result.rare_p = 1;
-  for (Column& c : result.columns) {
-    c.rare_p = std::min(1.0, c.rare_p * rare_columns);
-    result.rare_p = std::min(result.rare_p, c.rare_p);
-  }
-  const FlipTest test = flip_test(scores, options.flips, options.seed, options.significance);
-  result.p_value = test.p_value;
-  result.max_T = test.statistic;
-  result.limit = test.limit;
-
-  // The best shape speaks for a hypothesis.
-  struct OfShape {
-    double T = 0, rare_p = 1;
-  };
-  std::map<std::pair<int, int>, OfShape> tests;
-  for (const Column& c : result.columns) {
-    OfShape& t = tests[{c.hypothesis, c.shape}];
-    t.T = std::max(t.T, c.T);
-    t.rare_p = std::min(t.rare_p, c.rare_p);
-  }
-  std::vector<Screened> best(library.hypotheses.size());
-  for (Screened& s : result.shapes) {
-    const OfShape& t = tests[{s.hypothesis, s.shape}];
-    s.T = t.T;
-    s.rare_p = t.rare_p;
-    Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
-    const double reach = std::max(b.reach, s.reach);
-    if (b.hypothesis < 0 || s.gain > b.gain) b = s;
-    b.reach = reach;
-  }
-  result.candidates.clear();
-  for (const Screened& s : best)
-    if (s.hypothesis >= 0) result.candidates.push_back(s);
-  std::stable_sort(result.candidates.begin(), result.candidates.end(),
-                   [](const Screened& a, const Screened& b) { return a.gain > b.gain; });
 }
 
 }  // namespace isac::explain

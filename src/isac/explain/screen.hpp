@@ -9,7 +9,8 @@
 /// T cannot pass the square root of the blocks that carry an effect, because those blocks are their own yardstick. Where they are few
 /// (decays of the free joint), the effect's own part is taken out of the scatter first: jackknife over blocks, Student's t. Where they are
 /// hardly any (a slip, a stop that is hardly touched), the score is measured by what blocks elsewhere scatter. `rare`: both,
-/// Bonferroni over as many columns.
+/// Bonferroni over as many columns. What rests within its runs (an offset, a drift of the day) is told from a sensor's zero that moves
+/// between runs by its runs alone: where those scatter more than their blocks do, T is Student's of the runs' scatter, as a normal's.
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -17,6 +18,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +37,7 @@ struct Column {
   double raw_norm2 = 0;                   ///< Σ x²: what was there before the projection
   double chain_norm2[kChains] = {};       ///< Σ x⊥² of each chain
   double plain_norm2[kChains] = {};       ///< the same of x⊥/σ as it is in time, before the noise's filter
+  double resting = 0;                     ///< share of Σ x⊥² that the means of its runs hold, 0 to 1
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
@@ -79,13 +82,14 @@ void judge(Screen& screen, const Prepared& data, const Library& library, const S
 /// Orthonormal basis of the fitted parameters' sensitivities.
 [[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);
 
-/// p-value of the largest |Σ g|/√Σ g² over columns (rows: blocks), by joint sign flips of the blocks.
+/// p-value of the largest |Σ g|/√Σ g² over columns (rows: blocks), or of a smaller statistic that stands for it, by joint sign flips of
+/// the blocks.
 struct FlipTest {
   double statistic = 0, p_value = 1;
   double limit = 0;  ///< that the largest T of noise passes with the probability asked for
 };
 [[nodiscard]] FlipTest flip_test(const Eigen::MatrixXd& block_scores, int flips, std::uint64_t seed,
-                                 double significance);
+                                 double significance, std::optional<double> observed = std::nullopt);
 
 /// Generic functions of the measured signals, one column each: what an unknown effect may look like.
 class Dictionary {

@@ -9,6 +9,7 @@
 #include <set>
 #include <thread>
 
+#include "isac/explain/generic_fit.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::explain {
@@ -21,6 +22,7 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kConvention = 0.12;     // relative
 constexpr double kKeptPromise = 0.1;     // of the linear gain
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
+constexpr double kBeaten = 1.645;        // sigma, by functions without a name
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
 class Search {
@@ -42,6 +44,7 @@ class Search {
     take_colour();
     forward();
     if (found_.added.size() > 1) swap_and_drop();
+    if (found_.adequate && found_.added.size() == 1) hold_against_functions();
     if (found_.adequate) leave_half_a_step();
     return std::move(found_);
   }
@@ -278,23 +281,28 @@ class Search {
     return step;
   }
 
-  /// An amplitude at the end of its plausible range closes a gap for the wrong reason.
+  /// What closes a gap for the wrong reason: an amplitude at the end of its plausible range, a creep that would have to be faster than one,
+  /// a Stribeck friction that is less at rest than in motion.
   bool is_unphysical(const Trial& t) {
     const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+    std::string why;
     for (int i = 0; i < h.info().parameter_count; ++i) {
       const auto k = static_cast<std::size_t>(i);
-      const double null = h.info().parameters[i].null_value, margin = 1e-6 * (h.upper[k] - h.lower[k]);
-      if (!h.free[k] || !h.amplitude[k]) continue;
-      const bool at_end = (t.values[k] <= h.lower[k] + margin && h.lower[k] != null) ||
-                          (t.values[k] >= h.upper[k] - margin && h.upper[k] != null);
-      if (!at_end) continue;
-      const std::string sentence =
-          fmt::format("ruled out: needs {} at the end of its plausible range", h.info().parameters[i].name);
-      found_.notes.push_back({h.id(), sentence});
-      say(h.id() + ": " + sentence);
-      return true;
+      const auto& parameter = h.info().parameters[i];
+      const double null = parameter.null_value, margin = 1e-6 * (h.upper[k] - h.lower[k]);
+      if (!h.free[k]) continue;
+      const bool at_end = h.amplitude[k] && ((t.values[k] <= h.lower[k] + margin && h.lower[k] != null) ||
+                                             (t.values[k] >= h.upper[k] - margin && h.upper[k] != null));
+      const bool too_fast = !h.amplitude[k] && h.info().state_count > 0 &&
+                            std::string_view(parameter.unit) == "s" && t.values[k] <= 1.02 * h.lower[k];
+      if (at_end || too_fast) why = fmt::format("needs {} at the end of its plausible range", parameter.name);
     }
-    return false;
+    if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] <= t.values[0])
+      why = "needs less friction at rest than in motion";
+    if (why.empty()) return false;
+    found_.notes.push_back({h.id(), "ruled out: " + why});
+    say(h.id() + ": ruled out: " + why);
+    return true;
   }
 
   /// A response at a finite size that no size of the effect keeps: it was the curvature of noise.
@@ -376,6 +384,26 @@ class Search {
       return true;
     }
     return false;
+  }
+
+  /// A name that functions without one beat is only like the truth, though it leave nothing that a whole search would find.
+  void hold_against_functions() {
+    const Step& step = found_.steps.front();
+    const GenericFit generic = fit_generic(around(predictor_, found_.baseline, found_.weights), step.screen);
+    if (generic.functions.empty()) return;
+    const Trial& named = step.trials.front();
+    const Comparison behind = behind_generic(data_, named.residual, ranking_.parameters_of(named), generic);
+    if (behind.t < kBeaten || behind.separation < kTwinLimit) {
+      say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
+                      ranking_.id_of(named), std::abs(behind.t), behind.t > 0 ? "ahead" : "behind",
+                      behind.separation));
+      return;
+    }
+    const std::string sentence =
+        fmt::format("ruled out: {:.1f} sigma behind functions that have no name", behind.t);
+    found_.notes.push_back({ranking_.id_of(named), sentence});
+    say(ranking_.id_of(named) + ": " + sentence);
+    found_.adequate = false;
   }
 
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,

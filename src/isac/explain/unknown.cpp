@@ -6,19 +6,12 @@
 #include <set>
 
 #include "isac/core/units.hpp"
+#include "isac/explain/generic_fit.hpp"
 
 namespace isac::explain {
 namespace {
 
-constexpr std::size_t kTried = 24;     // columns that enter the selection, best first
-constexpr double kWorthTaking = 0.10;  // of the first column's gain
-constexpr std::size_t kMostTaken = 3;
 constexpr int kShapeBins = 24;
-
-struct Entry {
-  std::size_t column;
-  Eigen::VectorXd rows;
-};
 
 /// What the picture's abscissa is, for a variable of the dictionary.
 double abscissa(const PreparedRun& run, std::size_t k, const std::string& variable) {
@@ -89,17 +82,9 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
   Unknown unknown;
   const Prepared& data = place.predictor->data();
   const Dictionary generic(data);
-  // Of each column: its gain if it were alone. The best of them decides the chain.
-  std::vector<std::pair<double, std::size_t>> order;
-  std::size_t index = 0;
-  for (const Column& c : screen.columns) {
-    if (c.hypothesis >= 0) continue;
-    if (c.norm2 > 1e-9 && c.T >= 0.7 * screen.limit) order.emplace_back(c.score * c.score / c.norm2, index);
-    ++index;
-  }
-  if (order.empty()) return unknown;
-  std::sort(order.rbegin(), order.rend());
-  const Chain chain = generic.chain(order.front().second);
+  const GenericFit fit = fit_generic(place, screen);
+  if (fit.functions.empty()) return unknown;
+  const Chain chain = fit.chain;
   static constexpr const char* kSubsystem[] = {"muscle", "pcu", "pcu", "joint"};
   static constexpr const char* kSignal[] = {"torque", "p1", "p2", "motion"};
   unknown.subsystem = kSubsystem[static_cast<int>(chain)];
@@ -107,38 +92,11 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
   unknown.unit =
       chain == Chain::kPressure1 || chain == Chain::kPressure2 ? "kg/cm2" : data.baseline.output_unit;
 
-  std::vector<Entry> entries;
-  for (const auto& [gain, column] : order) {
-    if (entries.size() >= kTried) break;
-    if (generic.chain(column) != chain) continue;
-    Eigen::VectorXd rows = generic.rows(column);
-    weigh(data, *place.weights, rows);
-    entries.push_back({column, place.project(rows)});
-  }
-  Eigen::VectorXd residual = -place.residual;
-  double first = 0, taken = 0;
   std::set<std::string> depends, tried;
-  for (std::size_t round = 0; round < kMostTaken; ++round) {
-    std::size_t best = entries.size();
-    double best_gain = 0;
-    for (std::size_t e = 0; e < entries.size(); ++e) {
-      const double norm2 = entries[e].rows.squaredNorm();
-      if (norm2 < 1e-9) continue;
-      const double score = entries[e].rows.dot(residual);
-      if (score * score / norm2 <= best_gain) continue;
-      best_gain = score * score / norm2;
-      best = e;
-    }
-    if (best == entries.size()) break;
-    if (round == 0) first = best_gain;
-    if (best_gain < kWorthTaking * first || best_gain < 12 * screen.noise_unit) break;
-    taken += best_gain;
-    const std::vector<std::string> variables = generic.variables(entries[best].column);
-    if (round == 0) unknown.variable = variables.empty() ? "angle" : variables.back();
+  for (const std::size_t function : fit.functions) {
+    const std::vector<std::string> variables = generic.variables(function);
+    if (depends.empty()) unknown.variable = variables.empty() ? "angle" : variables.back();
     depends.insert(variables.begin(), variables.end());
-    const Eigen::VectorXd unit = entries[best].rows.normalized();
-    residual -= unit.dot(residual) * unit;
-    for (Entry& e : entries) e.rows -= unit.dot(e.rows) * unit;
   }
   for (std::size_t c = 0; c < generic.size(); ++c)
     if (generic.chain(c) == chain)
@@ -150,11 +108,11 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
   double squares = 0;
   for (std::size_t i = 0; i < data.rows.size(); ++i)
     if (data.rows[i].chain == chain)
-      squares += residual[static_cast<Eigen::Index>(i)] * residual[static_cast<Eigen::Index>(i)];
+      squares += fit.residual[static_cast<Eigen::Index>(i)] * fit.residual[static_cast<Eigen::Index>(i)];
   double rows = 0;
   for (const Row& row : data.rows) rows += row.chain == chain ? 1.0 : 0.0;
   const double left = std::max(0.0, squares - rows);
-  unknown.share = taken > 0 ? taken / (taken + left) : 0.0;
+  unknown.share = fit.gain > 0 ? fit.gain / (fit.gain + left) : 0.0;
   unknown.variable_unit = unit_of(unknown.variable);
   fill_shape(place, chain, unknown);
   return unknown;

@@ -15,10 +15,10 @@ constexpr double kKernelForgets =
 constexpr double kLongestLag = 1.2;                 // s
 constexpr double kShortest = 0.03, kLongest = 3.0;  // s, of the memory
 constexpr int kMemories = 24;
-constexpr double kFastest = 4.0;                     // Hz
-constexpr double kWanders = 100.0;                   // s, memory of a zero that wanders
-constexpr double kWanderLags[3] = {2.0, 14.0, 4.0};  // s: from, to, and over how many of them
-constexpr double kByChance = 3;                      // standard errors
+constexpr double kFastest = 4.0;    // Hz
+constexpr double kWanders = 100.0;  // s, memory of a zero that wanders
+constexpr double kWanderBin = 2.0;  // s, rows whose mean is one reading of the zero
+constexpr double kByChance = 9;     // twice the logarithm of the likelihoods' ratio
 
 bool is_slow(const Colour& c) {
   return (c.slow > 0 && c.memory > 0) || c.wander > 0;
@@ -126,6 +126,65 @@ Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights, const E
   return rows;
 }
 
+namespace {
+
+/// Variance of a zero that wanders with a memory of 100 s, by maximum likelihood: means of bins are d + white noise, d starts anywhere in each
+/// piece (a constant of a run may be an effect). Zero unless the likelihoods' ratio speaks for it.
+double wander_of(const std::vector<std::vector<double>>& pieces, std::size_t rows_per_bin) {
+  if (rows_per_bin == 0) return 0;
+  std::vector<std::vector<double>> bins;
+  double squares = 0;
+  std::size_t count = 0;
+  for (const std::vector<double>& x : pieces) {
+    bins.emplace_back();
+    for (std::size_t k = 0; k + rows_per_bin <= x.size(); k += rows_per_bin) {
+      double sum = 0;
+      for (std::size_t i = k; i < k + rows_per_bin; ++i) sum += x[i];
+      bins.back().push_back(sum / static_cast<double>(rows_per_bin));
+      squares += bins.back().back() * bins.back().back();
+      ++count;
+    }
+  }
+  constexpr std::size_t kFewest = 20;
+  if (count < bins.size() + kFewest || !(squares > 0)) return 0;
+  const double stay = std::exp(-kWanderBin / kWanders);
+  // Log likelihood with the white noise's variance at its best, for a wander of `ratio` times that variance.
+  double white = 0;
+  const auto log_likelihood = [&](double ratio) {
+    constexpr double kAnywhere = 1e8;
+    double misfit = 0, log_spread = 0, n = 0;
+    for (const std::vector<double>& x : bins) {
+      double d = 0, p = kAnywhere;
+      for (std::size_t k = 0; k < x.size(); ++k) {
+        if (k > 0) {
+          d *= ratio > 0 ? stay : 1;
+          p = ratio > 0 ? stay * stay * p + ratio * (1 - stay * stay) : p;
+          const double spread = p + 1;
+          misfit += (x[k] - d) * (x[k] - d) / spread;
+          log_spread += std::log(spread);
+          ++n;
+        }
+        const double gain = p / (p + 1);
+        d += gain * (x[k] - d);
+        p -= gain * p;
+      }
+    }
+    white = misfit / n;
+    return -0.5 * (n * std::log(white) + log_spread);
+  };
+  const double still = log_likelihood(0);
+  double most = still, wander = 0;
+  for (double decade = -2; decade < 2.51; decade += 0.125) {
+    const double ratio = std::pow(10.0, decade), here = log_likelihood(ratio);
+    if (here <= most) continue;
+    most = here;
+    wander = ratio * white;
+  }
+  return 2 * (most - still) > kByChance ? wander : 0.0;
+}
+
+}  // namespace
+
 Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain) {
   // Pieces without gaps.
   std::vector<std::vector<double>> pieces;
@@ -169,40 +228,7 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   if (first + 8 > lags || !(covariance[0] > 0)) return none;
 
   Colour best;
-  // A zero that wanders: how much more two rows differ that lie 14 to 18 s apart within a run than two that lie 2 to 6 s apart (a constant
-  // of a run may be an effect), where that is more than the fast noise makes by chance.
-  double fall = 0, weight = 0, fast = 0;
-  double level = 0;  // what lasts beyond the fast noise
-  for (std::size_t lag = lags / 2; lag <= lags; ++lag)
-    level += covariance[lag] / static_cast<double>(lags - lags / 2 + 1);
-  for (std::size_t lag = 0; lag <= lags; ++lag)
-    fast += (lag == 0 ? 1 : 2) * (covariance[lag] - level) * (covariance[lag] - level);
-  for (const std::vector<double>& x : pieces) {
-    double near = 0, far = 0, steps = 0;
-    for (double s = 0; s < kWanderLags[2]; s += 0.5) {
-      const auto to = static_cast<std::size_t>((kWanderLags[1] + s) / spacing),
-                 from = static_cast<std::size_t>((kWanderLags[0] + s) / spacing);
-      if (x.size() < to + to / 2) break;
-      double at_near = 0, at_far = 0;
-      for (std::size_t k = to; k < x.size(); ++k) {
-        at_near -= 0.5 * (x[k] - x[k - from]) * (x[k] - x[k - from]);
-        at_far -= 0.5 * (x[k] - x[k - to]) * (x[k] - x[k - to]);
-      }
-      near += at_near / static_cast<double>(x.size() - to);
-      far += at_far / static_cast<double>(x.size() - to);
-      ++steps;
-    }
-    if (steps == 0) continue;
-    fall += static_cast<double>(x.size()) * (near - far) / steps;
-    weight += static_cast<double>(x.size());
-  }
-  if (weight > 0) {
-    fall /= weight;
-    const double chance = std::sqrt(2 * fast / weight),
-                 share = std::exp(-(kWanderLags[0] + 0.5 * kWanderLags[2]) / kWanders) -
-                         std::exp(-(kWanderLags[1] + 0.5 * kWanderLags[2]) / kWanders);
-    if (fall > kByChance * chance) best.wander = fall / share;
-  }
+  best.wander = wander_of(pieces, static_cast<std::size_t>(std::lround(kWanderBin / spacing)));
   const double wander = std::min(best.wander, covariance[std::min(lags, first * 4)]);
   double least = std::numeric_limits<double>::infinity();
   for (int m = 0; m < kMemories; ++m) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <limits>
@@ -75,6 +76,11 @@ double student_t_two_sided(double t, double degrees_of_freedom) {
   if (!(degrees_of_freedom > 0) || !std::isfinite(t)) return kNoValue;
   return 2.0 *
          boost::math::cdf(boost::math::complement(boost::math::students_t(degrees_of_freedom), std::abs(t)));
+}
+
+double normal_two_sided_limit(double probability) {
+  if (!(probability > 0 && probability <= 1)) return kNoValue;
+  return boost::math::quantile(boost::math::complement(boost::math::normal(), 0.5 * probability));
 }
 
 double chi_square_upper(double statistic, double degrees_of_freedom) {

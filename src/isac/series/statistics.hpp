@@ -21,6 +21,8 @@ namespace isac::series {
 /// Student's t: the point that |t| exceeds with probability 1 − `confidence`.
 [[nodiscard]] double student_t_limit(double confidence, double degrees_of_freedom);
 [[nodiscard]] double student_t_two_sided(double t, double degrees_of_freedom);
+/// Standard normal: the point that |z| exceeds with this probability.
+[[nodiscard]] double normal_two_sided_limit(double probability);
 [[nodiscard]] double chi_square_upper(double statistic, double degrees_of_freedom);
 
 /// Correlation time in samples of the spacing given, at least 1/2 (white). Means of the pieces are taken out

@@ -1,0 +1,81 @@
+#include "isac/explain/generic_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace isac::explain {
+namespace {
+
+constexpr std::size_t kTried = 24;     // columns that enter the selection, best first
+constexpr double kWorthTaking = 0.10;  // of the first column's gain
+constexpr double kWorthTakingUnits = 12;
+constexpr std::size_t kMostTaken = 3;
+constexpr double kStandsOut = 0.7;  // of the search's limit
+// The best of fifty functions takes 2 ln 50 units of noise more than one that was asked for.
+constexpr int kParametersOfOne = 5;
+
+struct Entry {
+  std::size_t function;
+  Eigen::VectorXd rows;
+};
+
+}  // namespace
+
+GenericFit fit_generic(const Around& place, const Screen& screen) {
+  GenericFit fit;
+  fit.residual = place.residual;
+  const Prepared& data = place.predictor->data();
+  const Dictionary generic(data);
+  // Of each column: its gain if it were alone. The best of them decides the chain.
+  std::vector<std::pair<double, std::size_t>> order;
+  std::size_t index = 0;
+  for (const Column& c : screen.columns) {
+    if (c.hypothesis >= 0) continue;
+    if (c.norm2 > 1e-9 && c.T >= kStandsOut * screen.limit)
+      order.emplace_back(c.score * c.score / c.norm2, index);
+    ++index;
+  }
+  if (order.empty()) return fit;
+  std::sort(order.rbegin(), order.rend());
+  fit.chain = generic.chain(order.front().second);
+  std::vector<Entry> entries;
+  for (const auto& [gain, function] : order) {
+    if (entries.size() >= kTried) break;
+    if (generic.chain(function) != fit.chain) continue;
+    Eigen::VectorXd rows = generic.rows(function);
+    weigh(data, *place.weights, rows);
+    entries.push_back({function, place.project(rows)});
+  }
+  double first = 0;
+  while (fit.functions.size() < kMostTaken) {
+    std::size_t best = entries.size();
+    double best_gain = 0;
+    for (std::size_t e = 0; e < entries.size(); ++e) {
+      const double norm2 = entries[e].rows.squaredNorm();
+      if (norm2 < 1e-9) continue;
+      const double score = entries[e].rows.dot(fit.residual);
+      if (score * score / norm2 <= best_gain) continue;
+      best_gain = score * score / norm2;
+      best = e;
+    }
+    if (best == entries.size()) break;
+    if (fit.functions.empty()) first = best_gain;
+    if (best_gain < kWorthTaking * first || best_gain < kWorthTakingUnits * screen.noise_unit) break;
+    fit.gain += best_gain;
+    fit.functions.push_back(entries[best].function);
+    const Eigen::VectorXd unit = entries[best].rows.normalized();
+    fit.residual -= unit.dot(fit.residual) * unit;
+    for (Entry& e : entries) e.rows -= unit.dot(e.rows) * unit;
+  }
+  return fit;
+}
+
+Comparison behind_generic(const Prepared& data, const Eigen::VectorXd& named, int named_parameters,
+                          const GenericFit& generic) {
+  return compare(data, generic.residual, named,
+                 named_parameters - kParametersOfOne * static_cast<int>(generic.functions.size()),
+                 noise_density(data, generic.residual));
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,34 @@
+/// @file
+/// What functions of the measured signals without a name make of a residual: the shape of an unknown effect, and the rival that a named one
+/// must not lose to.
+///
+///   r = r₀ + Σ a_k g_k,   g_k one after another, whichever takes most, of one chain; each projected off the fitted parameters and off
+///   those before it
+///
+/// Taken are at most three, each at least a tenth of the first's gain and 12 units of noise, among those whose T is 0.7 of the limit.
+/// Threads: safe on separate arguments. Errors: none (nothing taken where nothing stands out). Source: docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "isac/explain/compare.hpp"
+#include "isac/explain/screen.hpp"
+
+namespace isac::explain {
+
+struct GenericFit {
+  Chain chain = Chain::kTorque;
+  std::vector<std::size_t> functions;  ///< of the dictionary, in the order taken
+  double gain = 0;                     ///< Σ of what they took from ‖r₀‖²
+  Eigen::VectorXd residual;            ///< r
+};
+
+/// `screen`: of the same place, with its dictionary.
+[[nodiscard]] GenericFit fit_generic(const Around& place, const Screen& screen);
+
+/// How far a named effect's residual is behind that of nameless functions (t > 0), each counted as the one of many that was looked for.
+[[nodiscard]] Comparison behind_generic(const Prepared& data, const Eigen::VectorXd& named,
+                                        int named_parameters, const GenericFit& generic);
+
+}  // namespace isac::explain

@@ -1,0 +1,273 @@
+// From the scores of blocks to p-values; see the head of screen.hpp.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+#include <utility>
+
+#include "isac/explain/screen.hpp"
+#include "isac/series/statistics.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kCarryingBlocks = 8;
+// T cannot pass the square root of the blocks that carry a column: with fewer than these, and most of the chain elsewhere, it has
+// no power in a whole search.
+constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
+// And with fewer than these it can pass a whole search's limit, about 4, only if they all agree.
+constexpr double kBoundingBlocks = 25;
+constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
+constexpr int kBlocksElsewhere = 20;
+constexpr double kResting = 0.5;  // of a column's squares are means of runs: it is as certain as they are
+
+/// Scatter of a score without its own part: √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n, and how many parts carry it.
+struct Jackknife {
+  double scatter = 0, carried_by = 0;
+};
+
+Jackknife jackknife(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
+  const double all = norm2.sum(), amplitude = score.sum() / all;
+  const Eigen::ArrayXd left = (score - amplitude * norm2).array() / (1 - (norm2.array() / all).min(0.99));
+  return {std::sqrt(left.square().sum()), all * all / norm2.squaredNorm()};
+}
+
+double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
+  const Jackknife of = jackknife(score, norm2);
+  if (!(of.carried_by > 2)) return 1;  // no freedom is left
+  return of.scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / of.scatter, of.carried_by - 1)
+                        : 1.0;
+}
+
+/// p-value of a score of which whole runs scatter more than their blocks do:
+///
+///   W = Σ_b (g_b − a n_b)²/(1 − h_b)²,  R the same of whole runs,  F = R/W > 1:
+///   t = |Σ g|/√R with ν = F²/(1/ν_W + (F − 1)²/ν_R) degrees of freedom (Satterthwaite)
+std::optional<double> p_by_runs(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2,
+                                const std::vector<Eigen::Index>& run_of_block, Eigen::Index runs) {
+  Eigen::VectorXd run_score = Eigen::VectorXd::Zero(runs), run_norm2 = Eigen::VectorXd::Zero(runs);
+  for (Eigen::Index b = 0; b < score.size(); ++b) {
+    run_score[run_of_block[static_cast<std::size_t>(b)]] += score[b];
+    run_norm2[run_of_block[static_cast<std::size_t>(b)]] += norm2[b];
+  }
+  const Jackknife blocks = jackknife(score, norm2), whole = jackknife(run_score, run_norm2);
+  if (!(whole.scatter > blocks.scatter) || !(blocks.scatter > 0)) return std::nullopt;
+  const double F = whole.scatter * whole.scatter / (blocks.scatter * blocks.scatter);
+  const double of_blocks = std::max(1.0, blocks.carried_by - 1),
+               of_runs = std::max(1.0, whole.carried_by - 1);
+  const double freedom = F * F / (1 / of_blocks + (F - 1) * (F - 1) / of_runs);
+  return series::student_t_two_sided(std::abs(score.sum()) / whole.scatter, freedom);
+}
+
+/// What scores of any function of the signals scatter, chain by chain, in blocks that a column does not live in.
+class Elsewhere {
+ public:
+  Elsewhere(const std::vector<Column>& columns,
+            const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& joined,
+            std::vector<std::vector<char>> there)
+      : there_(std::move(there)) {
+    for (const Column& c : columns) {
+      if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
+      Functions& f = chains_[static_cast<int>(c.chain)];
+      f.score2.push_back(joined(c.atom_score).cwiseAbs2());
+      f.norm2.push_back(joined(c.atom_norm));
+    }
+  }
+
+  struct Scatter {
+    double largest =
+        0;  ///< variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell
+    int blocks = 0;  ///< that it was measured in
+  };
+  Scatter scatter(int chain, const Eigen::VectorXd& own_norm2) const {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(own_norm2.size()));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::sort(order.begin(), order.end(),
+              [&](Eigen::Index a, Eigen::Index b) { return own_norm2[a] > own_norm2[b]; });
+    std::vector<char> own(order.size(), 0);
+    double held = 0;
+    const double all = own_norm2.sum();
+    for (const Eigen::Index b : order) {
+      if (held >= kHeldByThem * all) break;
+      held += own_norm2[b];
+      own[static_cast<std::size_t>(b)] = 1;
+    }
+    Scatter found;
+    const Functions& f = chains_[chain];
+    for (std::size_t k = 0; k < f.score2.size(); ++k) {
+      double score2 = 0, norm2 = 0;
+      int blocks = 0;
+      for (Eigen::Index b = 0; b < own_norm2.size(); ++b) {
+        if (own[static_cast<std::size_t>(b)] != 0 ||
+            there_[static_cast<std::size_t>(chain)][static_cast<std::size_t>(b)] == 0)
+          continue;
+        score2 += f.score2[k][b];
+        norm2 += f.norm2[k][b];
+        ++blocks;
+      }
+      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum() && score2 > found.largest * norm2)
+        found = {score2 / norm2, blocks};
+    }
+    return found;
+  }
+
+ private:
+  struct Functions {
+    std::vector<Eigen::VectorXd> score2, norm2;  // of blocks
+  };
+  Functions chains_[kChains];
+  std::vector<std::vector<char>> there_;  ///< by chain and block: has it rows there?
+};
+
+}  // namespace
+
+FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double significance,
+                   std::optional<double> statistic) {
+  const Eigen::Index blocks = scores.rows(), columns = scores.cols();
+  Eigen::MatrixXd scaled = scores;
+  for (Eigen::Index j = 0; j < columns; ++j) {
+    const double norm = scaled.col(j).norm();
+    if (norm > 0) scaled.col(j) /= norm;
+  }
+  const double observed =
+      statistic.value_or(columns > 0 ? scaled.colwise().sum().cwiseAbs().maxCoeff() : 0.0);
+  std::vector<double> all;
+  all.reserve(static_cast<std::size_t>(flips));
+  std::mt19937_64 random(seed);
+  int reached = 1;
+  constexpr Eigen::Index kAtOnce = 128;
+  for (int done = 0; done < flips; done += kAtOnce) {
+    const Eigen::Index now = std::min<Eigen::Index>(kAtOnce, flips - done);
+    Eigen::MatrixXd signs(now, blocks);
+    for (Eigen::Index i = 0; i < now; ++i)
+      for (Eigen::Index b = 0; b < blocks; b += 64) {
+        std::uint64_t bits = random();
+        for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1)
+          signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
+      }
+    const Eigen::VectorXd largest = (signs * scaled).cwiseAbs().rowwise().maxCoeff();
+    all.insert(all.end(), largest.data(), largest.data() + largest.size());
+    reached += static_cast<int>((largest.array() >= observed * (1 - 1e-12)).count());
+  }
+  FlipTest test;
+  test.statistic = observed;
+  test.p_value = static_cast<double>(reached) / static_cast<double>(flips + 1);
+  test.limit = series::quantile(all, 1 - significance);
+  return test;
+}
+
+void judge(Screen& result, const Prepared& data, const Library& library, const ScreenOptions& options) {
+  const auto blocks = static_cast<Eigen::Index>(data.blocks);
+  const auto joined = [&](const Eigen::VectorXd& atoms) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(blocks);
+    for (Eigen::Index a = 0; a < atoms.size(); ++a)
+      sum[data.block_of_atom[static_cast<std::size_t>(a)]] += atoms[a];
+    return sum;
+  };
+  // Scatter of a score per unit of norm, and how many blocks carry it. A column that few blocks of its chain carry takes the
+  // largest scatter that any function of the signals has elsewhere: slow noise scatters slow columns most. Where there is too
+  // little elsewhere, nothing can be said of it.
+  std::vector<double> units;
+  double chain_blocks[kChains] = {};
+  std::vector<std::vector<char>> seen(kChains, std::vector<char>(static_cast<std::size_t>(blocks), 0));
+  std::vector<Eigen::Index> run_of_block(static_cast<std::size_t>(blocks), 0);
+  for (const Row& row : data.rows) {
+    seen[static_cast<std::size_t>(row.chain)][row.block] = 1;
+    run_of_block[row.block] = static_cast<Eigen::Index>(row.run);
+  }
+  for (int c = 0; c < kChains; ++c)
+    chain_blocks[c] = static_cast<double>(
+        std::count(seen[static_cast<std::size_t>(c)].begin(), seen[static_cast<std::size_t>(c)].end(), 1));
+  const auto chains_of = [&](const Column& c) {
+    return c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains
+                             : bit(c.chain);
+  };
+  const auto told_by_runs = [&](const Column& c) -> std::optional<double> {
+    if (c.resting <= kResting) return std::nullopt;
+    return p_by_runs(joined(c.atom_score), joined(c.atom_norm), run_of_block,
+                     static_cast<Eigen::Index>(data.runs.size()));
+  };
+  for (Column& c : result.columns) {
+    c.T = 0;
+    c.rare_p = 1;
+    if (c.norm2 <= 0) continue;
+    const double scatter2 = joined(c.atom_score).squaredNorm();
+    c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
+    c.unit = scatter2 / c.norm2;
+    c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
+    if (const std::optional<double> p = told_by_runs(c); p && *p > 0)
+      c.T = std::min(c.T, series::normal_two_sided_limit(*p));
+    if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
+  }
+  if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
+  Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
+  double rare_columns = 0;
+  const Elsewhere elsewhere(result.columns, joined, std::move(seen));
+  for (std::size_t k = 0; k < result.columns.size(); ++k) {
+    Column& c = result.columns[k];
+    scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
+    double most = 0;
+    for (int chain = 0; chain < kChains; ++chain)
+      if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
+    if (c.norm2 <= 0 || c.hypothesis < 0 || c.carried_by >= kBoundingBlocks) continue;
+    const Eigen::VectorXd own = joined(c.atom_norm);
+    if (c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most)) {
+      double unit = 1;
+      int seen_in = static_cast<int>(blocks);
+      for (int chain = 0; chain < kChains; ++chain) {
+        if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
+        const Elsewhere::Scatter there = elsewhere.scatter(chain, own);
+        unit = std::max(unit, there.blocks > 0 ? there.largest : std::numeric_limits<double>::infinity());
+        seen_in = std::min(seen_in, there.blocks);
+      }
+      if (std::isfinite(unit))
+        c.rare_p = series::student_t_two_sided(std::abs(c.score) / std::sqrt(unit * c.norm2), seen_in);
+    } else {
+      c.rare_p = jackknife_p(scores.col(static_cast<Eigen::Index>(k)), own);
+    }
+    c.rare_p = std::max(c.rare_p, told_by_runs(c).value_or(0));
+    ++rare_columns;
+  }
+  result.rare_p = 1;
+  for (Column& c : result.columns) {
+    c.rare_p = std::min(1.0, c.rare_p * rare_columns);
+    result.rare_p = std::min(result.rare_p, c.rare_p);
+  }
+  double largest = 0;
+  for (const Column& c : result.columns) largest = std::max(largest, c.T);
+  const FlipTest test = flip_test(scores, options.flips, options.seed, options.significance, largest);
+  result.p_value = test.p_value;
+  result.max_T = test.statistic;
+  result.limit = test.limit;
+
+  // The best shape speaks for a hypothesis.
+  struct OfShape {
+    double T = 0, rare_p = 1;
+  };
+  std::map<std::pair<int, int>, OfShape> tests;
+  for (const Column& c : result.columns) {
+    OfShape& t = tests[{c.hypothesis, c.shape}];
+    t.T = std::max(t.T, c.T);
+    t.rare_p = std::min(t.rare_p, c.rare_p);
+  }
+  std::vector<Screened> best(library.hypotheses.size());
+  for (Screened& s : result.shapes) {
+    const OfShape& t = tests[{s.hypothesis, s.shape}];
+    s.T = t.T;
+    s.rare_p = t.rare_p;
+    Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
+    const double reach = std::max(b.reach, s.reach);
+    if (b.hypothesis < 0 || s.gain > b.gain) b = s;
+    b.reach = reach;
+  }
+  result.candidates.clear();
+  for (const Screened& s : best)
+    if (s.hypothesis >= 0) result.candidates.push_back(s);
+  std::stable_sort(result.candidates.begin(), result.candidates.end(),
+                   [](const Screened& a, const Screened& b) { return a.gain > b.gain; });
+}
+
+}  // namespace isac::explain
