@@ -4,7 +4,7 @@
 ///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other
 ///   limit = max(q98 + b ln(0.02 N/α), 8 s, 3 quanta),  b = max((q98 − q90)/ln 5, q98/ln 50)
 ///
-/// q are quantiles of |d|: tails are continued as an exponential, so that noise with tails as thin as Laplace's passes the limit
+/// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: tails are continued as an exponential, so that noise with tails as thin as Laplace's passes the limit
 /// anywhere in N samples with probability α at most; normal noise never comes near it. s is the standard deviation of white
 /// noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
 /// Units: the signal's. Threads: pure. Errors: none.
