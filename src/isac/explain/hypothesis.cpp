@@ -81,7 +81,7 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "torque_ripple" && at == 2) {
     std::vector<double> grid;
     const double step = 0.6 * kPi / std::max(0.1, r.angle_high - r.angle_low);
-    for (double n = 6; n < 70; n += step) grid.push_back(n);
+    for (double n = 8.5; n < 70; n += step) grid.push_back(n);
     return grid;
   }
   if (id == "flow_limit" && at == 0) return {0.35 * r.rate, 0.6 * r.rate, 0.85 * r.rate};

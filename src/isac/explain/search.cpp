@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "isac/explain/generic_fit.hpp"
+#include "isac/explain/plausible.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::explain {
@@ -28,7 +29,12 @@ constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 class Search {
  public:
   Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options)
-      : predictor_(predictor), library_(library), data_(data), options_(options), ranking_(data, library) {}
+      : predictor_(predictor),
+        library_(library),
+        data_(data),
+        options_(options),
+        ranking_(data, library),
+        plausible_(data) {}
 
   Found run() {
     found_.floors = floors_of(data_);
@@ -261,15 +267,29 @@ class Search {
     }
   }
 
-  Step step_here() {
+  /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
+  bool is_open_at_least(const Step& step, double size) const {
+    std::set<std::string> every;
+    for (const Hypothesis& h : library_.hypotheses) every.insert(h.id());
+    const Gate nameless = gate_of(step.screen, every);
+    return step.gate.significant && nameless.dense_size >= std::max(options_.material, size);
+  }
+
+  Step screened_step() {
     Step step;
     step.screen = screen_here();
     step.gate = gate_of(step.screen);
+    return step;
+  }
+
+  Step step_here() { return refitted(screened_step()); }
+
+  Step refitted(Step step) {
     if (!step.gate.significant || !step.gate.material) return step;
     step.trials = refit_all(shortlist(step.screen));
     std::set<std::string> ignored;
     std::erase_if(step.trials, [&](const Trial& t) {
-      const bool wrong = is_unphysical(t) || is_empty_promise(t, step.screen);
+      const bool wrong = is_implausible(t) || is_empty_promise(t, step.screen);
       if (wrong) ignored.insert(ranking_.id_of(t));
       return wrong;
     });
@@ -281,27 +301,12 @@ class Search {
     return step;
   }
 
-  /// What closes a gap for the wrong reason: an amplitude at the end of its plausible range, a creep that would have to be faster than one,
-  /// a Stribeck friction that is less at rest than in motion.
-  bool is_unphysical(const Trial& t) {
+  bool is_implausible(const Trial& t) {
     const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
-    std::string why;
-    for (int i = 0; i < h.info().parameter_count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      const auto& parameter = h.info().parameters[i];
-      const double null = parameter.null_value, margin = 1e-6 * (h.upper[k] - h.lower[k]);
-      if (!h.free[k]) continue;
-      const bool at_end = h.amplitude[k] && ((t.values[k] <= h.lower[k] + margin && h.lower[k] != null) ||
-                                             (t.values[k] >= h.upper[k] - margin && h.upper[k] != null));
-      const bool too_fast = !h.amplitude[k] && h.info().state_count > 0 &&
-                            std::string_view(parameter.unit) == "s" && t.values[k] <= 1.02 * h.lower[k];
-      if (at_end || too_fast) why = fmt::format("needs {} at the end of its plausible range", parameter.name);
-    }
-    if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] <= t.values[0])
-      why = "needs less friction at rest than in motion";
-    if (why.empty()) return false;
-    found_.notes.push_back({h.id(), "ruled out: " + why});
-    say(h.id() + ": ruled out: " + why);
+    const std::string objection = plausible_.objection(h, t.values);
+    if (objection.empty()) return false;
+    found_.notes.push_back({h.id(), "ruled out: " + objection});
+    say(h.id() + ": ruled out: " + objection);
     return true;
   }
 
@@ -434,10 +439,11 @@ class Search {
       ++tried;
       found_.added.back() = trials[i].hypothesis;
       move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
-      Step rest = step_here();
-      if (rest.gate.significant && rest.gate.material &&
-          rest.gate.size >= kSmallRemainder * trials[i].material)
-        continue;
+      const double large = kSmallRemainder * trials[i].material;
+      Step rest = screened_step();
+      if (is_open_at_least(rest, large)) continue;
+      rest = refitted(std::move(rest));
+      if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
       say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
@@ -508,6 +514,7 @@ class Search {
   Prepared& data_;
   const ExplainOptions& options_;
   Ranking ranking_;
+  Plausible plausible_;
   Found found_;
   Around place_;  ///< of found_.model
   std::size_t rows_[kChains] = {};

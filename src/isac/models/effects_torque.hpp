@@ -297,7 +297,7 @@ struct TorqueRipple {
                                     .parameter_count = 3,
                                     .parameters = {{"s", "N m", 1, -10, 10, 0.05},
                                                    {"c", "N m", 1, -10, 10, 0.05},
-                                                   {"N", "-", 1, 3, 100, 16, kAnyValue}},
+                                                   {"N", "-", 1, 8, 100, 16, kAnyValue}},
                                     .state_count = 0,
                                     .torque_term = true,
                                     .linear = false,
