@@ -140,6 +140,28 @@ TEST(CouldHide, bounds_what_the_data_would_not_show_and_names_no_effect_twice) {
   EXPECT_TRUE(e.where.empty());
 }
 
+TEST(Floor, holds_the_slow_part_of_the_noise_that_no_model_can_close) {
+  TiedRig rig;
+  auto runs = test::record_all(rig, fitted_runs());
+  std::mt19937 random(31);
+  std::normal_distribution<double> gauss;
+  constexpr double kSlow = 0.010, kMemory = 0.2;  // N m, s
+  for (series::Recording& run : runs) {
+    const double stay = std::exp(-0.002 / kMemory);
+    double z = kSlow * gauss(random);
+    for (std::size_t k = 0; k < run.columns[0].values.size(); ++k) {
+      run.columns[6].values[k] -= 0.5 * z / rig.radius;
+      run.columns[7].values[k] += 0.5 * z / rig.radius;
+      z = stay * z + kSlow * std::sqrt(1 - stay * stay) * gauss(random);
+    }
+  }
+  const Explanation e = explain(runs, HeldOut(), options_for(rig));
+  const double white = rig.radius * std::sqrt(2.0) * rig.force_noise;
+  ASSERT_FALSE(e.signals.empty());
+  // 84 s hold some 200 memories: the slow part's variance is known to a tenth, so the floor to 3 %; three of that.
+  EXPECT_NEAR(e.signals.front().noise_floor, std::hypot(white, kSlow), 0.1 * std::hypot(white, kSlow));
+}
+
 TEST(RawEffects, names_hum_and_spikes_that_the_low_passed_rows_cannot_show) {
   TiedRig rig;
   auto runs = test::record_all(rig, fitted_runs()),

@@ -83,7 +83,7 @@ void add_signals(const Predictor& predictor, const Library& library, const Found
                     : label.scale * raw_residual(predictor, found.model.model, chain).rms();
     }
     const auto c = static_cast<std::size_t>(chain);
-    s.noise_floor = label.scale * found.floors.white[c];
+    s.noise_floor = label.scale * found.floors.all(static_cast<Chain>(c));
     s.floor_from = found.floors.from[c].empty() ? "differences" : found.floors.from[c];
     s.p_value = chain_p_value(found, library, chain);
     e.signals.push_back(std::move(s));

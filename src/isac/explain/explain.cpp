@@ -110,8 +110,10 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
   const ModelPoint user = found.added.empty() ? found.baseline.model : plain_baseline(predictor, found);
   gap.before = scale * raw_residual(predictor, user, chain).rms();
   gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
-  gap.noise_floor = scale * (chain == Chain::kMotion ? found.weights.sigma[static_cast<int>(chain)]
-                                                     : found.floors.white[static_cast<int>(chain)]);
+  const auto c = static_cast<int>(chain);
+  gap.noise_floor =
+      scale * (chain == Chain::kMotion ? std::hypot(found.weights.sigma[c], found.floors.slow[c])
+                                       : found.floors.all(chain));
   if (proof.runs() == 0) return;
   const Sums before = proof.residual(user, chain), after = proof.residual(found.model.model, chain);
   gap.heldout_before = scale * before.rms();

@@ -21,6 +21,14 @@ Floors floors_of(const Prepared& data) {
   return floors;
 }
 
+void add_slow_part(const Weights& noise, Floors& floors) {
+  for (int c = 0; c < kChains; ++c) {
+    floors.slow[c] = noise.sigma[c] * std::sqrt(noise.colour[c].slow + noise.colour[c].wander);
+    if (floors.slow[c] > 0)
+      floors.from[c] = "differences, and what is left that is slow and follows no signal";
+  }
+}
+
 void reweight(const Prepared& data, const Fit& fit, Weights& weights) {
   for (int c = 0; c < kChains; ++c) {
     std::vector<double> fast;

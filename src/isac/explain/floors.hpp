@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <string>
 
 #include "isac/explain/explanation.hpp"
@@ -15,10 +16,19 @@ namespace isac::explain {
 struct Floors {
   double white[kChains] = {kNotKnown, kNotKnown, kNotKnown,
                            kNotKnown};  ///< of one sample at the recording's rate, N m or Pa
+  /// Of what is slower than that in the sensors and follows no signal: the noise's coloured part and a zero that wanders.
+  double slow[kChains] = {0, 0, 0, 0};
   std::string from[kChains];
+
+  /// What no model can close, N m or Pa: √(white² + slow²).
+  [[nodiscard]] double all(Chain chain) const {
+    return std::hypot(white[static_cast<int>(chain)], slow[static_cast<int>(chain)]);
+  }
 };
 
 [[nodiscard]] Floors floors_of(const Prepared& data);
+/// Sets the slow parts, from the colours of the noise.
+void add_slow_part(const Weights& noise, Floors& floors);
 
 /// Sets the weights to the standard deviation of rows that is not slower than half a second: noise, with little of a missing effect.
 void reweight(const Prepared& data, const Fit& fit, Weights& weights);

@@ -227,7 +227,8 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
     if (std::any_of(e.effects.begin(), e.effects.end(), is) ||
         std::find(options.excluded.begin(), options.excluded.end(), id) != options.excluded.end())
       continue;
-    const double floor = found.floors.white[static_cast<int>(effect.chain)];
+    const double floor = found.floors.white[static_cast<int>(effect.chain)],
+                 told = found.floors.all(effect.chain);
     if (!(effect.rms >= options.material * floor)) continue;
     // Beside an effect that was named, a small line is what that effect's equation leaves over.
     const double named =
@@ -245,7 +246,7 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
       e.gap = {};
       e.gap.signal = label.signal;
       e.gap.unit = label.unit;
-      e.gap.noise_floor = floor;
+      e.gap.noise_floor = told;
       e.gap.before = e.gap.after = raw_residual(predictor, model, effect.chain).rms();
       const Sums sums = proof.residual(model, effect.chain);
       e.gap.heldout_before = e.gap.heldout_after = sums.rms();
@@ -254,9 +255,8 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
     if (e.gap.signal == label.signal) {
       e.gap.after = less(e.gap.after, fitted);
       e.gap.heldout_after = less(e.gap.heldout_after, held);
-      const double open = e.gap.heldout_before * e.gap.heldout_before - floor * floor;
-      if (open > 0)
-        e.gap.share_closed = 1 - (e.gap.heldout_after * e.gap.heldout_after - floor * floor) / open;
+      const double open = e.gap.heldout_before * e.gap.heldout_before - told * told;
+      if (open > 0) e.gap.share_closed = 1 - (e.gap.heldout_after * e.gap.heldout_after - told * told) / open;
       e.waterfall.push_back({effect.candidate.name, e.gap.after, e.gap.heldout_after});
     }
     effect.candidate.evidence.push_back(

@@ -52,6 +52,7 @@ class Search {
     if (found_.added.size() > 1) swap_and_drop();
     if (found_.adequate && found_.added.size() == 1) hold_against_functions();
     if (found_.adequate) leave_half_a_step();
+    add_slow_part(noise_of_what_is_left(), found_.floors);
     return std::move(found_);
   }
 
@@ -108,6 +109,16 @@ class Search {
     found_.weights.take(data_);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(found_.baseline);
+  }
+
+  /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.
+  Weights noise_of_what_is_left() const {
+    Weights left = found_.weights;
+    if (!found_.adequate) return left;
+    const Eigen::VectorXd plain = unfiltered(data_, found_.weights, found_.model.residual);
+    for (int c = 0; c < kChains; ++c)
+      if (rows_[c] > 0) left.colour[c] = colour_of(data_, plain, static_cast<Chain>(c));
+    return left;
   }
 
   /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
