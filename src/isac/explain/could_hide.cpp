@@ -18,6 +18,17 @@ int first_amplitude(const Hypothesis& h) {
   return -1;
 }
 
+/// Typical sizes are those of the seed's joint. On another rig an effect is asked for at a tenth of what the output holds.
+double output_norm(const Prepared& data, const Weights& weights) {
+  double squares = 0;
+  for (const Row& row : data.rows)
+    if (row.chain == Chain::kTorque) {
+      const double y = data.runs[row.run].smooth_torque[row.sample];
+      squares += y * y;
+    }
+  return std::sqrt(squares) / weights.sigma[static_cast<int>(Chain::kTorque)];
+}
+
 struct Bound {
   double size = 0;        ///< reporting units
   double rows_norm2 = 0;  ///< of the raw response at that size: how much could be there
@@ -29,7 +40,7 @@ std::vector<CouldHide> could_hide(const Prepared& data, const Library& library, 
                                   std::size_t most) {
   if (found.steps.empty()) return {};
   std::set<std::string> taken;
-  for (const std::string& id : not_testable(library, found)) taken.insert(id);
+  for (const std::string& id : not_testable(data, library, found)) taken.insert(id);
   for (const int h : found.added) taken.insert(library.hypotheses[static_cast<std::size_t>(h)].id());
   const Screen& screen = found.steps.back().screen;
   std::map<std::string, Bound> bounds;
@@ -66,15 +77,21 @@ std::vector<CouldHide> could_hide(const Prepared& data, const Library& library, 
   return out;
 }
 
-std::vector<std::string> not_testable(const Library& library, const Found& found) {
+std::vector<std::string> not_testable(const Prepared& data, const Library& library, const Found& found) {
   std::vector<std::string> out = library.not_testable;
   if (found.steps.empty()) return out;
   std::map<std::string, double> reach;
+  const double tenth = data.baseline.terms.empty() ? 0.0 : 0.1 * output_norm(data, found.weights);
   for (const Column& c : found.steps.front().screen.columns) {
     if (c.hypothesis < 0) continue;
-    const std::string id = library.hypotheses[static_cast<std::size_t>(c.hypothesis)].id();
-    const double unit = std::max(c.unit, found.steps.front().screen.noise_unit);
-    reach[id] = std::max(reach[id], std::sqrt(c.norm2 / unit));
+    const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(c.hypothesis)];
+    const std::string id = h.id();
+    // Beside the noise of the final model: what is missing from the first is no noise.
+    const double unit = found.steps.size() > 1 ? found.steps.back().screen.noise_unit
+                                               : std::max(c.unit, found.steps.back().screen.noise_unit);
+    const double size =
+        tenth > 0 && h.info().linear && c.raw_norm2 > 0 ? tenth / std::sqrt(c.raw_norm2) : 1.0;
+    reach[id] = std::max(reach[id], size * std::sqrt(c.norm2 / unit));
   }
   for (const auto& [id, sigma] : reach)
     if (sigma < kTestable) out.push_back(id);

@@ -216,9 +216,10 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.next_experiment =
         next_experiment(predictor, library, found, {.limits = options.limits, .threads = options.threads});
   e.where = regions(predictor, library, found);
+  constexpr std::size_t kMostHidden = 64;  // every effect that was looked for and not found has a bound
   add_raw_effects(predictor, found, proof, options, e);
-  e.could_hide = could_hide(data, library, found, 8);
-  e.not_testable = not_testable(library, found);
+  e.could_hide = could_hide(data, library, found, kMostHidden);
+  e.not_testable = not_testable(data, library, found);
   std::erase_if(e.not_testable, [&](const std::string& id) {  // what was refitted was tested
     const auto is = [&](const Candidate& c) { return c.id == id; };
     return std::any_of(e.effects.begin(), e.effects.end(), is) ||

@@ -309,8 +309,10 @@ void add_limits(Document& page, const Explanation& e) {
   Table table{
       .caption = "Largest that would go unnoticed here (95 % upper bound of the effect's first parameter).",
       .columns = {{"Effect"}, {"Up to", true}, {"Unit"}}};
+  constexpr std::size_t kMost = 12;  // largest first; the JSON answer has all
   for (const explain::CouldHide& one : e.could_hide)
-    table.rows.push_back({name_of(one.id), number(one.size, 2), pretty_unit(one.unit)});
+    if (table.rows.size() < kMost)
+      table.rows.push_back({name_of(one.id), number(one.size, 2), pretty_unit(one.unit)});
   if (!table.rows.empty()) page.table(table);
   if (e.not_testable.empty()) return;
   Table untested{.caption = "Not excited by these runs, so neither found nor excluded.",
