@@ -12,10 +12,6 @@ namespace {
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 
-// Chance that what is missing is none of the catalogue though one of it fits: 1 of 48 single names on unseen blind datasets was wrong
-// (docs/explain.md), and what a rig may have is more than what the generator hides.
-constexpr double kNotOfTheCatalogue = 0.03;
-
 }  // namespace
 
 int Ranking::parameters_of(const Trial& t) const {
@@ -102,7 +98,7 @@ void Ranking::weigh(std::vector<Trial>& trials) {
     t.weight = t.in_set ? std::exp(-0.5 * behind * behind) : 0.0;
     sum += t.weight;
   }
-  for (Trial& t : trials) t.weight *= (1 - kNotOfTheCatalogue) / sum;
+  for (Trial& t : trials) t.weight *= kSurest / sum;
 }
 
 }  // namespace isac::explain

@@ -10,6 +10,7 @@
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/outliers.hpp"
+#include "isac/explain/ranking.hpp"
 #include "isac/explain/spectrum.hpp"
 #include "isac/models/effects.hpp"
 
@@ -38,7 +39,7 @@ Candidate candidate_of(const char* id) {
   c.name = info.term;
   c.subsystem = subsystem_name(info.where);
   c.equation = info.equation;
-  c.confidence = 0.97;
+  c.confidence = kSurest;
   for (int p = 0; p < info.parameter_count; ++p) {
     Estimated e;
     e.name = info.parameters[p].name;
