@@ -6,6 +6,8 @@
 #include <cmath>
 
 #include "experiment_bench.hpp"
+#include "isac/core/units.hpp"
+#include "isac/explain/experiment_runs.hpp"
 #include "isac/explain/experiment_words.hpp"
 
 namespace isac::explain {
@@ -54,6 +56,13 @@ TEST(NextExperiment, asks_for_another_rig_where_no_run_helps) {
   EXPECT_TRUE(next.runs.empty());
   EXPECT_LT(next.separation_expected, 3);
   EXPECT_NE(next.sentence.find("unloaded"), std::string::npos) << next.sentence;
+}
+
+TEST(PlanRun, asks_for_pressures_as_a_person_would_write_them) {
+  const PlannedRun planned{.seconds = 20, .mean_pressure_kgcm2 = 17 * 0.1, .pressure_swing_kgcm2 = 3 * 0.1};
+  ASSERT_NE(planned.mean_pressure_kgcm2, 1.7);
+  EXPECT_EQ(plan_run(planned).mean_pressure, 1.7 * kPascalPerKgfCm2);
+  EXPECT_EQ(plan_run(planned).pressure_swing, 0.3 * kPascalPerKgfCm2);
 }
 
 }  // namespace

@@ -214,15 +214,18 @@ double least_seconds(const PlannedRun& run) {
 }
 
 series::PlanRun plan_run(const PlannedRun& run) {
+  // Four digits are what a person would write; "1.7000000000000002 kg/cm2" is not.
+  const auto written = [](double value) { return std::round(value * 1e4) / 1e4; };
+  const auto pascals = [&](double value) { return written(value) * kPascalPerKgfCm2; };
   return {.experiment = run.experiment,
           .duration = run.seconds,
-          .delta_pressure = run.delta_pressure_kgcm2 * kPascalPerKgfCm2,
-          .mean_pressure = run.mean_pressure_kgcm2 * kPascalPerKgfCm2,
-          .amplitude = run.amplitude_rad,
-          .middle = run.middle_rad,
-          .peak_speed = run.peak_speed_rad_s,
-          .pressure_swing = run.pressure_swing_kgcm2 * kPascalPerKgfCm2,
-          .pressure_period = run.pressure_period_s,
+          .delta_pressure = pascals(run.delta_pressure_kgcm2),
+          .mean_pressure = pascals(run.mean_pressure_kgcm2),
+          .amplitude = written(run.amplitude_rad),
+          .middle = written(run.middle_rad),
+          .peak_speed = written(run.peak_speed_rad_s),
+          .pressure_swing = pascals(run.pressure_swing_kgcm2),
+          .pressure_period = written(run.pressure_period_s),
           .waveform = run.waveform};
 }
 
