@@ -39,7 +39,8 @@ struct SignalGap {
   double p_value = 1;              ///< of "the residual is noise", over the whole search
   double after = kNotKnown;        ///< rmse with the effects added
   double heldout = kNotKnown;  ///< rmse of the baseline, fitted by plain least squares, on the held-out runs
-  std::string floor_from;      ///< "repeats", "holds", "differences", "data sheet"
+  std::string
+      floor_from;  ///< "repeats", "holds", "differences" (with the slow part, where there is one), "data sheet"
 };
 
 /// A region in which the disagreement sits.

@@ -31,11 +31,7 @@ bool Ranking::is_limit_case(const Trial& t) const {
     const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
                  high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
     if (t.values[k] <= low || t.values[k] >= high) return true;
-    // Narrower, or slower, than an encoder tells.
     if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
-      return true;
-    if (h.dry && std::string_view(parameter.unit) == "rad/s" &&
-        t.values[k] < 2 * data_.rig.angle_step / kSlowestStep)
       return true;
   }
   return false;
