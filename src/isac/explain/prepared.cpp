@@ -65,10 +65,11 @@ const std::vector<double>* values_of(const series::Recording& run, const char* n
 }
 
 /// Pressure at the start of a run. A valve that does not answer small errors keeps it for good, so the noise of one reading will not do:
-/// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is more than the readings' scatter.
+/// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is far more than the readings' scatter: slow noise begins anywhere.
 double first_pressure(const std::vector<double>& pressure, const std::vector<double>& command,
                       double interval) {
   constexpr double kLongest = 2.0, kShortest = 0.3, kLag = 0.17;  // s
+  constexpr double kFarMore = 5;
   std::size_t n = 0;
   while (n < pressure.size() && static_cast<double>(n) * interval < kLongest && command[n] == command[0]) ++n;
   if (static_cast<double>(n) * interval < kShortest) return pressure.front();
@@ -79,7 +80,7 @@ double first_pressure(const std::vector<double>& pressure, const std::vector<dou
   }
   const double det = s1 * sgg - sg * sg, c1 = (s1 * sgp - sg * sp) / det, c0 = (sp - c1 * sg) / s1;
   const double scatter = std::sqrt(std::max(0.0, spp - c0 * sp - c1 * sgp) / s1);
-  return pressure[0] + (std::abs(c1) > 3 * scatter ? c0 + c1 : sp / s1);
+  return pressure[0] + (std::abs(c1) > kFarMore * scatter ? c0 + c1 : sp / s1);
 }
 
 PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
@@ -268,8 +269,13 @@ double centred_sum(std::span<const double> g, std::span<const double> x, std::si
   double sum = 0;
   if (i >= reach && i + reach < n) {
     const double* p = x.data() + (i - reach);
-    for (std::size_t k = 0; k < g.size(); ++k) sum += g[k] * p[k];
-    return sum;
+    // Four sums that do not wait for one another; always the same ones, so the digits are the same everywhere.
+    double part[4] = {0, 0, 0, 0};
+    std::size_t k = 0;
+    for (; k + 4 <= g.size(); k += 4)
+      for (std::size_t j = 0; j < 4; ++j) part[j] += g[k + j] * p[k + j];
+    for (; k < g.size(); ++k) sum += g[k] * p[k];
+    return sum + ((part[0] + part[1]) + (part[2] + part[3]));
   }
   for (std::ptrdiff_t k = -reach; k <= reach; ++k)
     sum += g[static_cast<std::size_t>(k + reach)] *
