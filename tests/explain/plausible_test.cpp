@@ -46,16 +46,20 @@ struct Case {
 TEST(Plausible, objects_to_what_is_not_what_its_name_says_and_to_nothing_else) {
   const Setting setting;
   const Case cases[] = {
-      {"stribeck_friction", {0.02, 0.03, 0.1}, {0.02, 0.015, 0.1}},   // less at rest
-      {"stribeck_friction", {0.02, 0.03, 0.05}, {0.02, 0.03, 0.02}},  // below 2 steps in 50 ms: 0.031 rad/s
+      {"stribeck_friction", {0.02, 0.03, 0.1}, {0.02, 0.015, 0.1}},    // less at rest
+      {"stribeck_friction", {0.02, 0.03, 0.05}, {0.02, 0.03, 0.02}},   // below 2 steps in 50 ms: 0.031 rad/s
+      {"stribeck_friction", {0.02, 0.022, 0.1}, {0.02, 0.0205, 0.1}},  // no more at rest
       {"pressure_dependent_friction", {0.02, 1.0}, {0.02, 0.03}},
       {"hysteresis", {0.02, 0.05}, {0.02, 0.001}},
       {"hysteresis", {0.02, 0.1}, {0.02, 1.5}},
+      {"hysteresis", {0.02, 0.2}, {0.02, 0.4}},  // of 1 rad in all
+      {"maxwell_slip", {0.02, 0.1}, {0.02, 0.4}},
+      {"asymmetric_hysteresis", {0.02, 0.03, 0.05, 0.05}, {0.02, 0.03, 0.05, 0.4}},
       {"asymmetric_hysteresis", {0.02, 0.03, 0.05, 0.05}, {0.02, 0.022, 0.05, 0.048}},
       {"asymmetric_hysteresis", {0.02, 0.02, 0.05, 0.1}, {0.02, 0.02, 0.05, 0.05}},
       {"end_stop", {50, 0.35, -3.0}, {0.04, 0.05, 0.0}},
       {"torque_ripple", {0.02, 0.01, 16}, {0.02, 0.01, 8}},
-      {"creep", {0.2, 5}, {0.2, 0.5}},
+      {"creep", {0.2, 5}, {0.2, 1.0}},
       {"torque_ripple", {9.0, 0.01, 16}, {10.0, 0.01, 16}},  // an amplitude at its end
   };
   for (const Case& c : cases) {

@@ -82,7 +82,7 @@ struct Creep {
       .where = Subsystem::kMuscle,
       .equation = "-k1 (phi - c), c' = (phi - c)/tau",
       .parameter_count = 2,
-      .parameters = {{"k1", "N m/rad", 1, 0, 1e3, 0.5}, {"tau", "s", 1, 0.5, 2000, 20, kAnyValue}},
+      .parameters = {{"k1", "N m/rad", 1, 0, 1e3, 0.5}, {"tau", "s", 1, 1, 2000, 20, kAnyValue}},
       .state_count = 1,
       .torque_term = true,
       .linear = false,

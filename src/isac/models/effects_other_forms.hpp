@@ -119,7 +119,7 @@ struct PressureCreep {
       .equation = "-b r (dp - c), c' = (dp - c)/tau",
       .parameter_count = 2,
       .parameters = {{"b", "N cm2/kg", kUnit, -100 * kUnit, 100 * kUnit, 5 * kUnit},
-                     {"tau", "s", 1, 0.5, 2000, 10, kAnyValue}},
+                     {"tau", "s", 1, 1, 2000, 10, kAnyValue}},
       .state_count = 1,
       .torque_term = true,
       .linear = false,
