@@ -30,6 +30,12 @@ const char* unit_of(const std::string& variable) {
   return variable == "time" ? "s" : "kg/cm2";
 }
 
+/// The signal that a variable is read from: the direction of motion is the velocity's.
+const std::string& signal_of(const std::string& variable) {
+  static const std::string kVelocity = "velocity";
+  return variable == "direction" ? kVelocity : variable;
+}
+
 void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
   const Prepared& data = place.predictor->data();
   double low = 1e300, high = -1e300;
@@ -96,12 +102,12 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
   for (const std::size_t function : fit.functions) {
     const std::vector<std::string> variables = generic.variables(function);
     if (depends.empty()) unknown.variable = variables.empty() ? "angle" : variables.back();
-    depends.insert(variables.begin(), variables.end());
+    for (const std::string& v : variables) depends.insert(signal_of(v));
   }
   for (std::size_t c = 0; c < generic.size(); ++c)
     if (generic.chain(c) == chain)
       for (const std::string& v : generic.variables(c))
-        if (depends.count(v) == 0) tried.insert(v);
+        if (depends.count(signal_of(v)) == 0) tried.insert(signal_of(v));
   unknown.depends_on.assign(depends.begin(), depends.end());
   unknown.independent.assign(tried.begin(), tried.end());
   // Of what is explainable: the chain's squares beyond those of its noise.
