@@ -98,7 +98,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
     return e.active->hypothesis->info().state_count > 0 &&
            e.active->hypothesis->info().id != std::string_view("valve_hysteresis");
   });
-  const int substeps = with_states ? 4 : 1;
+  const int substeps = with_states ? 2 : 1;
   if (effects.empty()) {
     // The same steps for the first-order lag alone, bit for bit.
     for (std::size_t k = 0; k < n; ++k)
