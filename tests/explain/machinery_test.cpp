@@ -194,6 +194,23 @@ TEST(Refine, finds_every_effect_that_the_data_holds_without_noise) {
   EXPECT_GE(found, 12);
 }
 
+TEST(Refine, lets_a_held_tolerance_come_back_as_far_as_its_bounds_let_it) {
+  Around place;
+  place.held.slopes = Eigen::MatrixXd::Zero(4, 1);
+  place.held.slopes(0, 0) = 2;
+  place.held.low = Eigen::VectorXd::Constant(1, -1);
+  place.held.high = Eigen::VectorXd::Zero(1);  // at its upper bound
+  place.held_gram = place.held.slopes.transpose() * place.held.slopes;
+  const Eigen::Vector4d other(0, 3, 0, 1);
+  const auto left = [&](double along) {
+    const Eigen::Vector4d slope = place.held.slopes.col(0);
+    return Eigen::Vector4d(place.release(other + along * slope));
+  };
+  EXPECT_LT((left(0.4) - other).norm(), 1e-8);
+  EXPECT_NEAR(left(1.5)[0], 1.0, 1e-8);    // half a step further than it may
+  EXPECT_NEAR(left(-0.4)[0], -0.8, 1e-8);  // the other way it stands already
+}
+
 TEST(HeldOutRuns, cannot_be_reached_but_by_the_proof) {
   static_assert(!std::is_convertible_v<HeldOut, std::vector<series::Recording>>);
   static_assert(!std::is_constructible_v<std::span<const series::Recording>, HeldOut>);

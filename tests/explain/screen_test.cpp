@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <random>
+#include <stdexcept>
 
 #include "tied_data.hpp"
 
@@ -135,6 +136,76 @@ TEST(Judge, still_sees_what_rests_within_runs_where_the_runs_agree) {
     seen += screen.columns[0].T > 4 ? 1 : 0;
   }
   EXPECT_GE(seen, 190);
+}
+
+TEST(JointP, of_two_tests_is_small_no_more_often_than_it_says) {
+  constexpr double kLevel = 0.005;
+  // The two at their worst: never small together. P(joint ≤ α) = P(flips ≤ f(α)) + P(rare ≤ g(α)).
+  for (const double alpha : {0.0005, 0.005, 0.006, 0.05, 0.5, 0.9}) {
+    double flips = 0, rare = 0;
+    for (double p = 1e-5; p < 1; p += 1e-5) {
+      if (joint_p(p, 1, kLevel) <= alpha) flips = p;
+      if (joint_p(1, p, kLevel) <= alpha) rare = p;
+    }
+    EXPECT_LE(flips + rare, alpha + 2e-5) << alpha;
+    EXPECT_GE(flips + rare, 0.98 * alpha - 2e-5) << alpha;
+  }
+  EXPECT_EQ(joint_p(1, 1, kLevel), 1);
+  for (const bool first : {true, false}) {
+    EXPECT_LE(joint_p(first ? 0.0024 : 1, first ? 1 : 0.0024, kLevel), kLevel);
+    EXPECT_GT(joint_p(first ? 0.0026 : 1, first ? 1 : 0.0026, kLevel), kLevel);
+  }
+  // A test that seldom speaks costs next to nothing where nothing is found.
+  EXPECT_NEAR(joint_p(0.5, 1, kLevel), 0.5, 0.02);
+}
+
+TEST(KeptResponses, serve_a_screen_beside_another_torque_as_well) {
+  const test::TiedRig rig{.dry = 0.02};
+  const Prepared data =
+      prepare(test::record_all(rig, {test::by_hand(20, 0.35, 0.6), test::by_hand(20, 0.3, 2.0)}), rig.facts(),
+              {}, 2.0);
+  const Library library = make_library(data);
+  const Predictor predictor(data);
+  const Weights weights{{0.0025, 120, 120, 0.005}};
+  const Fit stem = fit_baseline(predictor, library.tolerances, weights);
+  Active friction;
+  for (const Hypothesis& h : library.hypotheses)
+    if (h.id() == "coulomb_friction") friction = {&h, h.shapes.front()};
+  const Fit with = refit(predictor, stem, {friction}, weights);
+  const ScreenOptions options{.flips = 99, .dictionary = true};
+  Responses kept;
+  (void)screen(around(predictor, stem, weights), library, options, &kept);
+  const Around place = around(predictor, with, weights);
+  const Screen again = screen(place, library, options, &kept), anew = screen(place, library, options);
+  ASSERT_EQ(again.columns.size(), anew.columns.size());
+  for (std::size_t k = 0; k < anew.columns.size(); ++k)
+    EXPECT_NEAR(again.columns[k].T, anew.columns[k].T, 0.02)
+        << (anew.columns[k].hypothesis >= 0
+                ? library.hypotheses[static_cast<std::size_t>(anew.columns[k].hypothesis)].info().id
+                : anew.columns[k].name.c_str());
+}
+
+TEST(KeptResponses, are_not_taken_where_what_was_added_changes_them) {
+  const test::TiedRig rig;
+  const Prepared data = prepare(test::record_all(rig, {test::by_hand(20, 0.35, 0.6)}), rig.facts(), {}, 2.0);
+  const Library library = make_library(data);
+  const auto find = [&](const char* id) -> const Hypothesis& {
+    for (const Hypothesis& h : library.hypotheses)
+      if (h.id() == id) return h;
+    throw std::runtime_error(id);
+  };
+  const auto beside = [&](const char* id) {
+    Fit fit;
+    fit.model.effects.push_back({&find(id), {}});
+    return fit;
+  };
+  EXPECT_TRUE(Responses::hold(beside("coulomb_friction"), find("cubic_stiffness")));
+  EXPECT_FALSE(Responses::hold(beside("coulomb_friction"), find("coulomb_friction")));
+  EXPECT_FALSE(Responses::hold(beside("coulomb_friction"), find("force_gain_error")));
+  EXPECT_FALSE(Responses::hold(beside("force_gain_error"), find("cubic_stiffness")));
+  EXPECT_FALSE(Responses::hold(beside("force_gain_error"), find("force_offset")));
+  EXPECT_TRUE(Responses::hold(beside("encoder_offset"), find("cubic_stiffness")));
+  EXPECT_FALSE(Responses::hold(beside("encoder_offset"), find("force_offset")));
 }
 
 }  // namespace

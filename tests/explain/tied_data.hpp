@@ -151,8 +151,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     }
     if (free) {  // dry friction holds the joint where no torque overcomes it
       const double push = torque(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
-      const bool held = velocity == 0 && push * torque(0) <= 0;
-      const double next = held ? 0 : velocity + kStep * (push - pulled) / near_inertia;
+      const bool stuck = velocity == 0 && push * torque(0) <= 0;
+      const double next = stuck ? 0 : velocity + kStep * (push - pulled) / near_inertia;
       velocity = velocity * next < 0 ? 0 : next;
       angle += kStep * velocity;
     }

@@ -47,25 +47,14 @@ const Fit& told_model(const Found& found, const Explanation& e) {
   return e.effects.empty() ? found.baseline : found.model;
 }
 
-/// p-value of the largest score of one chain over all columns that show in it, by the normal tail of each.
-double chain_p_value(const Found& found, const Library& library, Chain chain) {
+/// p-value of what shows in one chain; where something was found in it, of the whole search.
+double chain_p_value(const Found& found, Chain chain) {
   if (found.steps.empty()) return 1;
   if (chain == found.gate.chain && found.gate.significant) return found.gate.p_value;
-  const Screen& screen = found.steps.front().screen;
-  double largest = 0;
-  std::size_t columns = 0;
-  for (const Column& c : screen.columns) {
-    const unsigned chains =
-        c.hypothesis >= 0 ? library.hypotheses[static_cast<std::size_t>(c.hypothesis)].chains : bit(c.chain);
-    if (chains != bit(chain)) continue;
-    ++columns;
-    largest = std::max(largest, c.T);
-  }
-  return columns == 0 ? 1.0
-                      : std::min(1.0, static_cast<double>(columns) * std::erfc(largest / std::sqrt(2.0)));
+  return found.steps.front().screen.chain_p[static_cast<int>(chain)];
 }
 
-void add_signals(const Predictor& predictor, const Library& library, const Found& found, Explanation& e) {
+void add_signals(const Predictor& predictor, const Found& found, Explanation& e) {
   const Prepared& data = predictor.data();
   for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
     if (!data.has(chain)) continue;
@@ -85,7 +74,7 @@ void add_signals(const Predictor& predictor, const Library& library, const Found
     const auto c = static_cast<std::size_t>(chain);
     s.noise_floor = label.scale * found.floors.all(static_cast<Chain>(c));
     s.floor_from = found.floors.from[c].empty() ? "differences" : found.floors.from[c];
-    s.p_value = chain_p_value(found, library, chain);
+    s.p_value = chain_p_value(found, chain);
     e.signals.push_back(std::move(s));
   }
 }
@@ -258,6 +247,11 @@ std::string summary_of(const Explanation& e) {
       std::vector<std::string> names = terms_of(e.effects, 3), rivals = terms_of(e.alternatives, 3);
       std::string text = missed(e);
       if (names.empty()) return text + " These data cannot tell what is missing.";
+      if (e.alternatives.size() == 1 && e.alternatives.front().id == "unknown")
+        return text + fmt::format(
+                          " {} closes it ({}), but leaves over what noise seldom does: {} cannot be "
+                          "ruled out.",
+                          upper_first(joined(names)), closing(e), rivals.front());
       text +=
           fmt::format(" {} closes it ({}), but {} cannot be ruled out{}", upper_first(joined(names)),
                       closing(e), joined(rivals), e.verdict == Verdict::kFamily ? ", all of one kind" : "");
@@ -275,7 +269,7 @@ void describe(const Predictor& predictor, const Library& library, const Found& f
   const Chain chain = chain_of(predictor.data(), e.gap.signal);
   add_numbers(predictor, found, e);
   tell_in_units_of(predictor.data().baseline, e);
-  add_signals(predictor, library, found, e);
+  add_signals(predictor, found, e);
   add_waterfall(predictor, library, found, proof, chain, e);
   if (options.traces) {
     const ModelPoint &before = found.baseline.model, &after = told_model(found, e).model;

@@ -43,12 +43,6 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
   return c;
 }
 
-bool touches_pressures(const Library& library, const Found& found) {
-  return std::any_of(found.added.begin(), found.added.end(), [&](int h) {
-    return (library.hypotheses[static_cast<std::size_t>(h)].chains & kPressureChains) != 0;
-  });
-}
-
 void check_terms(const BaselineModel& baseline) {
   for (const std::string& term : baseline.terms)
     if (models::find_effect(term) < 0)
@@ -124,6 +118,24 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
   if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
+constexpr double kNoneOfThem = 0.35;  // of the belief, where a name leaves over what chance seldom does
+
+/// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
+void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
+  for (auto* named : {&e.effects, &e.alternatives})
+    for (Candidate& c : *named) c.confidence *= 1 - kNoneOfThem;
+  const Step& last = found.steps.back();
+  Unknown left = describe_unknown(around(predictor, found.model, found.weights), last.screen);
+  Candidate none;
+  none.id = none.form = "unknown";
+  none.name = "an effect that the catalogue does not have";
+  none.subsystem = left.subsystem.empty() ? e.effects.front().subsystem : left.subsystem;
+  none.confidence = kNoneOfThem * kSurest;
+  e.alternatives.push_back(none);
+  e.verdict = Verdict::kNotSeparable;
+  if (!left.depends_on.empty()) e.unknown = std::move(left);
+}
+
 /// None of the catalogue: what came nearest is told as ruled out, nothing is added.
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
@@ -148,10 +160,10 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   QuietPressure quiet = QuietPressure::learn(data);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
   auto predictor_here = std::make_unique<Predictor>(data);
-  Found found = search(*predictor_here, *library_here, data, options);
+  Found found = search(*predictor_here, *library_here, data, options, true);
   // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
   std::unique_ptr<Library> first_library;
-  if (touches_pressures(*library_here, found) && (!found.adequate || found.added.size() > 1)) {
+  if (found.worth_another_look) {
     const ModelPoint valves = found.model.model;
     first_library = std::move(library_here);
     quiet = QuietPressure::learn(data, &valves);
@@ -205,13 +217,17 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
   // A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what
   // anyone would have fitted.
-  constexpr double kWorse = 1.002;
+  constexpr double kWorse = 1.002, kWorseThanOwn = 1.01;
   if (!e.effects.empty() && proof.runs() > 0 &&
       (proof.residual(found.model.model, chain).rms() >
-           kWorse * proof.residual(found.baseline.model, chain).rms() ||
+           kWorseThanOwn * proof.residual(found.baseline.model, chain).rms() ||
        e.gap.heldout_after > kWorse * e.gap.heldout_before))
     e.verdict = Verdict::kUnknown;
-  if (e.verdict == Verdict::kUnknown) leave_unnamed(predictor, found, e);
+  if (e.verdict == Verdict::kUnknown) {
+    leave_unnamed(predictor, found, e);
+  } else if (found.remainder.doubtful && !e.effects.empty()) {
+    doubt(predictor, found, e);
+  }
   if (options.next_experiment && e.verdict != Verdict::kUnknown)
     e.next_experiment =
         next_experiment(predictor, library, found, {.limits = options.limits, .threads = options.threads});

@@ -33,7 +33,7 @@ struct ExplainOptions {
   std::vector<std::string> excluded{};  ///< effects that are not to be considered
   double significance = 0.005;          ///< of the whole search, for "something is missing"
   /// Smaller than this share of the noise floor is immaterial.
-  double material = 0.15;
+  double material = 0.10;
   int most_effects = 3;
   int threads = 2;
   std::uint64_t seed = 1;

@@ -345,7 +345,7 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
 }
 
 Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const Weights& weights,
-                              std::vector<Coordinate>* used) {
+                              std::vector<Coordinate>* used, Held* held) {
   // All chains, also those that the last refit left alone.
   std::vector<Coordinate> all;
   add_base(predictor, fit.model, kAllChains, all);
@@ -357,20 +357,36 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   const auto n = static_cast<Eigen::Index>(predictor.rows());
   Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
   predictor.predict(fit.model, kAllChains, here);
-  Eigen::MatrixXd out(n, static_cast<Eigen::Index>(all.size()));
-  Eigen::VectorXd column;
-  Eigen::Index columns = 0;
+  const auto is_held = [&](const Coordinate& c) {
+    const double value = fit.value(c), margin = c.tolerance ? 1e-3 * (c.upper - c.lower) : 0.0;
+    return c.base < 0 && (value < c.lower + margin || value > c.upper - margin);
+  };
+  const auto slopes_of = [&](const std::vector<Coordinate>& coordinates) {
+    Eigen::MatrixXd slopes(n, static_cast<Eigen::Index>(coordinates.size()));
+    Eigen::VectorXd column;
+    for (std::size_t j = 0; j < coordinates.size(); ++j) {
+      weighted_slope(predictor, fit.model, here, coordinates[j], fit.value(coordinates[j]), weights, column);
+      slopes.col(static_cast<Eigen::Index>(j)) = column;
+    }
+    return slopes;
+  };
+  std::vector<Coordinate> inside, at_bound;
   for (const Coordinate& c : all) {
-    const double value = fit.value(c), margin = 1e-3 * (c.upper - c.lower);
-    if (c.base < 0 &&
-        (value < c.lower + (c.tolerance ? margin : 0) || value > c.upper - (c.tolerance ? margin : 0)))
-      continue;
-    weighted_slope(predictor, fit.model, here, c, value, weights, column);
-    out.col(columns++) = column;
-    if (used != nullptr) used->push_back(c);
+    if (!is_held(c)) inside.push_back(c);
+    if (is_held(c) && c.tolerance) at_bound.push_back(c);
   }
-  out.conservativeResize(n, columns);
-  return out;
+  if (held != nullptr) {
+    held->slopes = slopes_of(at_bound);
+    held->low.resize(held->slopes.cols());
+    held->high.resize(held->slopes.cols());
+    for (std::size_t j = 0; j < at_bound.size(); ++j) {
+      const Coordinate& c = at_bound[j];
+      held->low[static_cast<Eigen::Index>(j)] = (c.lower - fit.value(c)) / c.scale;
+      held->high[static_cast<Eigen::Index>(j)] = (c.upper - fit.value(c)) / c.scale;
+    }
+  }
+  if (used != nullptr) *used = inside;
+  return slopes_of(inside);
 }
 
 Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,

@@ -46,10 +46,17 @@ struct Fit {
 [[nodiscard]] Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
                         const Weights& weights, int iterations = 12);
 
+/// Tolerances that stand at a bound: the derivative of the rows by each, and how far it may still go, in its scale.
+struct Held {
+  Eigen::MatrixXd slopes;
+  Eigen::VectorXd low, high;
+};
+
 /// Weighted derivative of the rows by each coordinate that is inside its bounds; columns in the order of `coordinates`,
-/// `used` says which.
+/// `used` says which. Tolerances at a bound have none: they go to `held`.
 [[nodiscard]] Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit,
-                                            const Weights& weights, std::vector<Coordinate>* used = nullptr);
+                                            const Weights& weights, std::vector<Coordinate>* used = nullptr,
+                                            Held* held = nullptr);
 
 /// Weighted difference of the rows when an effect is added to the fit's model, nothing refitted. `here` is the model's own
 /// prediction of all rows.

@@ -12,8 +12,7 @@ constexpr double kWorthTaking = 0.10;  // of the first column's gain
 constexpr double kWorthTakingUnits = 12;
 constexpr std::size_t kMostTaken = 3;
 constexpr double kStandsOut = 0.7;  // of the search's limit
-// The best of fifty functions takes 2 ln 50 units of noise more than one that was asked for.
-constexpr int kParametersOfOne = 5;
+constexpr int kParametersOfOne = 1 + kChoosingOne;
 
 struct Entry {
   std::size_t function;

@@ -17,6 +17,9 @@
 
 namespace isac::explain {
 
+/// What the best of many takes more than one that was asked for, in parameters: the best of fifty 2 ln 50 units of noise.
+inline constexpr int kChoosingOne = 4;
+
 struct GenericFit {
   Chain chain = Chain::kTorque;
   std::vector<std::size_t> functions;  ///< of the dictionary, in the order taken

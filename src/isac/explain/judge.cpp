@@ -22,6 +22,9 @@ constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
 constexpr double kBoundingBlocks = 25;
 constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
 constexpr int kBlocksElsewhere = 20;
+// Of the level at which something counts as found; and of what lies beyond it, where a share that seldom speaks would only keep p-values
+// from being uniform.
+constexpr double kShareOfEach = 0.5, kRareBeyond = 0.02;
 constexpr double kResting = 0.5;  // of a column's squares are means of runs: it is as certain as they are
 
 /// Scatter of a score without its own part: √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n, and how many parts carry it.
@@ -159,7 +162,16 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   return test;
 }
 
-void judge(Screen& result, const Prepared& data, const Library& library, const ScreenOptions& options) {
+double joint_p(double flips, double rare, double level) noexcept {
+  const auto least = [&](double p, double beyond) {
+    const double spent = kShareOfEach * level;
+    return p <= spent ? p / kShareOfEach : level + (p - spent) / beyond;
+  };
+  return std::min({1.0, least(flips, 1 - kRareBeyond), least(rare, kRareBeyond)});
+}
+
+void judge(Screen& result, const Prepared& data, const Library& library, const ScreenOptions& options,
+           const Yardstick& yardstick) {
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
   const auto joined = [&](const Eigen::VectorXd& atoms) {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(blocks);
@@ -205,7 +217,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
   if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
   Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
   double rare_columns = 0;
-  const Elsewhere elsewhere(result.columns, joined, std::move(seen));
+  const Elsewhere elsewhere(result.columns, joined, seen), beside(yardstick.functions, joined, seen);
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
     scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
@@ -219,7 +231,8 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
       int seen_in = static_cast<int>(blocks);
       for (int chain = 0; chain < kChains; ++chain) {
         if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
-        const Elsewhere::Scatter there = elsewhere.scatter(chain, own);
+        const Elsewhere::Scatter there =
+            (c.hypothesis == yardstick.hypothesis ? beside : elsewhere).scatter(chain, own);
         unit = std::max(unit, there.blocks > 0 ? there.largest : std::numeric_limits<double>::infinity());
         seen_in = std::min(seen_in, there.blocks);
       }
@@ -236,12 +249,30 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     c.rare_p = std::min(1.0, c.rare_p * rare_columns);
     result.rare_p = std::min(result.rare_p, c.rare_p);
   }
-  double largest = 0;
-  for (const Column& c : result.columns) largest = std::max(largest, c.T);
-  const FlipTest test = flip_test(scores, options.flips, options.seed, options.significance, largest);
+  const auto flipped = [&](auto&& takes, double level) {
+    std::vector<Eigen::Index> of;
+    double largest = 0;
+    for (std::size_t k = 0; k < result.columns.size(); ++k) {
+      if (!takes(result.columns[k])) continue;
+      of.push_back(static_cast<Eigen::Index>(k));
+      largest = std::max(largest, result.columns[k].T);
+    }
+    return flip_test(scores(Eigen::all, of), options.flips, options.seed, level, largest);
+  };
+  const FlipTest test = flipped([](const Column&) { return true; }, kShareOfEach * options.significance);
   result.p_value = test.p_value;
   result.max_T = test.statistic;
   result.limit = test.limit;
+  result.rare_limit = kShareOfEach * options.significance;
+  for (int chain = 0; chain < kChains; ++chain) {
+    const auto alone = [&](const Column& c) { return chains_of(c) == 1U << chain; };
+    double rare = 1;
+    for (const Column& c : result.columns)
+      if (alone(c)) rare = std::min(rare, c.rare_p);
+    if (chain_blocks[chain] > 0)
+      result.chain_p[chain] =
+          joint_p(flipped(alone, options.significance).p_value, rare, options.significance);
+  }
 
   // The best shape speaks for a hypothesis.
   struct OfShape {

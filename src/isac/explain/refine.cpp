@@ -26,8 +26,8 @@ class Projected {
     a.values = values_;
     for (std::size_t j = 0; j < free_.size(); ++j)
       a.values[free_[j]] = x[static_cast<Eigen::Index>(j)] * scale_[j];
-    return place_.residual +
-           place_.project(response(*place_.predictor, *place_.fit, place_.here, a, *place_.weights));
+    return place_.release(place_.residual + place_.project(response(*place_.predictor, *place_.fit,
+                                                                    place_.here, a, *place_.weights)));
   }
 
   bool operator()(const Eigen::VectorXd& at, Eigen::VectorXd& here, Eigen::MatrixXd* jacobian) const {
@@ -67,11 +67,25 @@ Around around(const Predictor& predictor, const Fit& fit, const Weights& weights
   place.predictor = &predictor;
   place.fit = &fit;
   place.weights = &weights;
-  place.basis = basis_of(sensitivities(predictor, fit, weights));
+  place.basis = basis_of(sensitivities(predictor, fit, weights, nullptr, &place.held));
+  for (Eigen::Index j = 0; j < place.held.slopes.cols(); ++j)
+    place.held.slopes.col(j) = place.project(place.held.slopes.col(j));
+  place.held_gram = place.held.slopes.transpose() * place.held.slopes;
   place.here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(fit.model, kAllChains, place.here);
   place.residual = place.project(fit.residual);
   return place;
+}
+
+Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
+  const Eigen::Index m = held.slopes.cols();
+  if (m == 0 || !left.allFinite()) return left;
+  Eigen::MatrixXd gram = held_gram;
+  const double largest = std::max(gram.diagonal().maxCoeff(), 1e-300);
+  for (Eigen::Index i = 0; i < m; ++i) gram(i, i) += 1e-9 * gram(i, i) + 1e-12 * largest;
+  const Eigen::VectorXd d = bounded_quadratic(gram, held.slopes.transpose() * left, held.low, held.high);
+  left += held.slopes * d;
+  return left;
 }
 
 Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& start, int iterations) {

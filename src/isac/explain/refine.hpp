@@ -2,10 +2,12 @@
 /// Refit of one effect beside a model whose own parameters are eliminated by projection: what a search can afford for each
 /// of its candidates.
 ///
-///   r(q) = (1 − Q Qᵀ)(r₀ + x(q)),   min ‖r(q)‖² over the effect's parameters q within their bounds, by Ceres
+///   r(q) = min over d of ‖(1 − Q Qᵀ)(r₀ + x(q) + H d)‖,   min ‖r(q)‖² over the effect's parameters q within their bounds
 ///
 /// r₀ is the model's residual, x(q) the effect's response, Q an orthonormal basis of the sensitivities of all that was fitted:
-/// a linear change of the model's parameters costs nothing. fit.hpp's refit() repeats the winners without that linearisation.
+/// a linear change of the model's parameters costs nothing. H are the slopes of tolerances that stand at a bound, having stood in for
+/// what is missing as far as they may: beside the effect they come back (d within what is left of their bounds).
+/// fit.hpp's refit() repeats the winners without that linearisation.
 /// Threads: safe on separate arguments. Errors: none. Source: Golub and Pereyra 1973; docs/derivations/explain.md.
 #pragma once
 
@@ -23,10 +25,18 @@ struct Around {
   Eigen::MatrixXd basis;     ///< Q
   Eigen::VectorXd here;      ///< its prediction of all rows
   Eigen::VectorXd residual;  ///< (1 − Q Qᵀ) r₀
+  Held held;                 ///< slopes projected
+  Eigen::MatrixXd held_gram;
 
   [[nodiscard]] Eigen::VectorXd project(const Eigen::VectorXd& x) const {
     return x - basis * (basis.transpose() * x);
   }
+  /// Column by column.
+  [[nodiscard]] Eigen::MatrixXd project_columns(const Eigen::MatrixXd& x) const {
+    return x - basis * (basis.transpose() * x);
+  }
+  /// A projected residual with what the held tolerances take of it when they come back.
+  [[nodiscard]] Eigen::VectorXd release(Eigen::VectorXd left) const;
 };
 
 [[nodiscard]] Around around(const Predictor& predictor, const Fit& fit, const Weights& weights);

@@ -4,13 +4,15 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <thread>
 #include <utility>
 
 namespace isac::explain {
 namespace {
 
-constexpr double kMimicked = 1e-5;  // of a response's squares left by the projection: all of it is mimicked
+constexpr std::size_t kTogether = 8;  // functions of the dictionary that are projected at once
+constexpr double kMimicked = 1e-5;    // of a response's squares left by the projection: all of it is mimicked
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
@@ -68,7 +70,7 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
 }
 
 /// Share of Σ x² that the means of runs (of each chain) hold.
-double held_by_runs(const Prepared& data, const Eigen::VectorXd& x) {
+double held_by_runs(const Prepared& data, const Eigen::Ref<const Eigen::VectorXd>& x) {
   double held = 0, sum = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
@@ -85,13 +87,186 @@ double held_by_runs(const Prepared& data, const Eigen::VectorXd& x) {
   return all > 0 ? held / all : 0.0;
 }
 
-struct Task {
-  int hypothesis, shape;
-};
-
+/// What one hypothesis, or some functions of the dictionary, add to the evidence.
 struct Done {
   std::vector<Column> columns;
-  Screened screened;
+  std::vector<Screened> shapes;
+};
+
+/// Can an amplitude not change its sign? Its bound is at its absence.
+bool is_one_way(const Hypothesis& h, const Values& way, bool alone) {
+  for (int i = 0; i < h.info().parameter_count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const double null = h.info().parameters[i].null_value;
+    if (!h.amplitude[k] || (!alone && way[k] == null)) continue;
+    if (h.lower[k] < null && h.upper[k] > null) return false;
+  }
+  return true;
+}
+
+class Screening {
+ public:
+  Screening(const Around& place, const Library& library, Responses* kept)
+      : place_(place), library_(library), data_(place.predictor->data()), generic_(data_), kept_(kept) {}
+
+  std::size_t functions() const { return generic_.size(); }
+
+  /// All shapes of a hypothesis.
+  Done effect(int hypothesis) const {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(hypothesis)];
+    std::vector<std::vector<Values>> ways;
+    Eigen::Index columns = 0;
+    for (const Values& shape : h.shapes) {
+      ways.push_back(directions(h, shape));
+      columns += static_cast<Eigen::Index>(ways.back().size());
+    }
+    Eigen::MatrixXd x = rows_of(h, hypothesis, ways, columns);
+    const Eigen::VectorXd raw = x.colwise().squaredNorm();
+    x = place_.project_columns(x);
+    Done done;
+    Eigen::Index first = 0;
+    for (std::size_t s = 0; s < ways.size(); ++s) {
+      const auto m = static_cast<Eigen::Index>(ways[s].size());
+      std::vector<Column> of_shape;
+      for (Eigen::Index a = 0; a < m; ++a) {
+        Column c = summary(x.col(first + a), raw[first + a]);
+        c.hypothesis = hypothesis;
+        c.shape = static_cast<int>(s);
+        c.amplitude = static_cast<int>(a);
+        of_shape.push_back(std::move(c));
+      }
+      done.shapes.push_back(linear_fit(h, h.shapes[s], ways[s], of_shape, x.middleCols(first, m)));
+      for (Column& c : of_shape) done.columns.push_back(std::move(c));
+      first += m;
+    }
+    return done;
+  }
+
+  /// Functions `first` to `last` of the dictionary.
+  Done dictionary(std::size_t first, std::size_t last) const {
+    Eigen::MatrixXd x(rows(), static_cast<Eigen::Index>(last - first));
+    for (std::size_t d = first; d < last; ++d) {
+      const auto column = static_cast<Eigen::Index>(d - first);
+      Eigen::VectorXf* known = kept_ != nullptr ? &kept_->function(d) : nullptr;
+      if (known != nullptr && known->size() > 0) {
+        x.col(column) = known->cast<double>();
+        continue;
+      }
+      Eigen::VectorXd values = generic_.rows(d);
+      weigh(data_, *place_.weights, values);
+      if (known != nullptr) *known = values.cast<float>();
+      x.col(column) = values;
+    }
+    const Eigen::VectorXd raw = x.colwise().squaredNorm();
+    x = place_.project_columns(x);
+    Done done;
+    for (std::size_t d = first; d < last; ++d) {
+      const auto column = static_cast<Eigen::Index>(d - first);
+      done.columns.push_back(summary(x.col(column), raw[column]));
+      done.columns.back().name = generic_.name(d);
+      done.columns.back().chain = generic_.chain(d);
+    }
+    return done;
+  }
+
+ private:
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(data_.rows.size()); }
+
+  /// Weighted responses to every way, side by side.
+  Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, const std::vector<std::vector<Values>>& ways,
+                          Eigen::Index columns) const {
+    Eigen::MatrixXf* known =
+        kept_ != nullptr && Responses::hold(*place_.fit, h) ? &kept_->effect(hypothesis) : nullptr;
+    if (known != nullptr && known->cols() == columns) return known->cast<double>();
+    Eigen::MatrixXd x(rows(), columns);
+    Eigen::Index column = 0;
+    for (const std::vector<Values>& of_shape : ways)
+      for (const Values& way : of_shape) {
+        x.col(column) = response(*place_.predictor, *place_.fit, place_.here, {&h, way}, *place_.weights);
+        if (!x.col(column).allFinite()) x.col(column).setZero();
+        ++column;
+      }
+    if (known != nullptr) *known = x.cast<float>();
+    return x;
+  }
+
+  /// Scores of a projected response against the residual.
+  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2) const {
+    const auto atoms = static_cast<Eigen::Index>(data_.atoms);
+    Column column;
+    column.raw_norm2 = raw_norm2;
+    column.atom_score = Eigen::VectorXd::Zero(atoms);
+    column.atom_norm = Eigen::VectorXd::Zero(atoms);
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const Row& row = data_.rows[static_cast<std::size_t>(i)];
+      const auto b = static_cast<Eigen::Index>(row.atom);
+      // Prediction − measured: an effect that is missing has the other sign.
+      column.atom_score[b] -= x[i] * place_.residual[i];
+      column.atom_norm[b] += x[i] * x[i];
+      column.chain_norm2[static_cast<int>(row.chain)] += x[i] * x[i];
+    }
+    column.resting = held_by_runs(data_, x);
+    const Eigen::VectorXd plain = unfiltered(data_, *place_.weights, x);
+    for (Eigen::Index i = 0; i < plain.size(); ++i)
+      column.plain_norm2[static_cast<int>(data_.rows[static_cast<std::size_t>(i)].chain)] +=
+          plain[i] * plain[i];
+    column.norm2 = column.atom_norm.sum();
+    // A third of a percent of a response is how its column was low-passed, not what the effect does.
+    if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
+      column.atom_score.setZero();
+      column.norm2 = 0;
+    }
+    column.score = column.atom_score.sum();
+    return column;
+  }
+
+  /// Amplitudes by least squares, and the values that a refit may start from.
+  Screened linear_fit(const Hypothesis& h, const Values& shape, const std::vector<Values>& ways,
+                      const std::vector<Column>& columns, const Eigen::Ref<const Eigen::MatrixXd>& x) const {
+    const auto m = static_cast<Eigen::Index>(ways.size());
+    Eigen::VectorXd score(m);
+    std::vector<bool> positive;
+    for (std::size_t a = 0; a < ways.size(); ++a) {
+      score[static_cast<Eigen::Index>(a)] = columns[a].score;
+      positive.push_back(is_one_way(h, ways[a], ways.size() == 1));
+    }
+    const SignedFit linear = signed_fit(x.transpose() * x, score, positive);
+    Screened s;
+    s.hypothesis = columns.front().hypothesis;
+    s.shape = columns.front().shape;
+    s.gain = linear.gain;
+    double all = 0;
+    for (std::size_t a = 0; a < ways.size(); ++a) {
+      const double amplitude = linear.amplitude[static_cast<Eigen::Index>(a)];
+      all += amplitude * amplitude * columns[a].norm2;
+      for (int c = 0; c < kChains; ++c) s.chain_norm2[c] += amplitude * amplitude * columns[a].plain_norm2[c];
+    }
+    // Parts that lie against one another are less together than each by itself.
+    for (double& norm2 : s.chain_norm2) norm2 *= all > 0 ? linear.gain / all : 0.0;
+    s.start = null_values(h, shape);
+    const double most = h.info().linear || h.info().hook == models::Hook::kTorque ? 50.0 : 4.0;
+    for (std::size_t a = 0; a < ways.size(); ++a) {
+      s.reach = std::max(s.reach, std::sqrt(columns[a].norm2));
+      const double factor = std::clamp(linear.amplitude[static_cast<Eigen::Index>(a)], -most, most);
+      for (int i = 0; i < h.info().parameter_count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        const double null = h.info().parameters[i].null_value;
+        if (!std::isfinite(null)) {
+          s.start[k] = shape[k];
+          continue;
+        }
+        if (ways.size() > 1 && ways[a][k] == null) continue;
+        s.start[k] = std::clamp(null + factor * (shape[k] - null), h.lower[k], h.upper[k]);
+      }
+    }
+    return s;
+  }
+
+  const Around& place_;
+  const Library& library_;
+  const Prepared& data_;
+  const Dictionary generic_;
+  Responses* kept_;
 };
 
 }  // namespace
@@ -116,40 +291,44 @@ Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
   return q;
 }
 
-Screen screen(const Around& place, const Library& library, const ScreenOptions& options) {
-  const Predictor& predictor = *place.predictor;
-  const Prepared& data = predictor.data();
-  const auto n = static_cast<Eigen::Index>(predictor.rows());
-  const auto atoms = static_cast<Eigen::Index>(data.atoms);
-  const Eigen::VectorXd& residual = place.residual;
+bool Responses::hold(const Fit& fit, const Hypothesis& h) noexcept {
+  const bool smooth_torque = h.info().hook == models::Hook::kTorque && !h.dry;
+  return std::none_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
+                      fit.model.effects.end(), [&](const Active& a) {
+                        return smooth_torque ? a.hypothesis->reads_force
+                                             : (a.hypothesis->chains & h.chains) != 0;
+                      });
+}
 
-  const auto summarise = [&](Eigen::VectorXd& x, Column& column) {
-    column.raw_norm2 = x.squaredNorm();
-    x = place.project(x);
-    column.atom_score = Eigen::VectorXd::Zero(atoms);
-    column.atom_norm = Eigen::VectorXd::Zero(atoms);
-    for (Eigen::Index i = 0; i < n; ++i) {
+Eigen::MatrixXf& Responses::effect(int hypothesis) {
+  return effects_[static_cast<std::size_t>(hypothesis)];
+}
+
+Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses& kept, int hypothesis,
+                           const Eigen::VectorXd& residual) {
+  Yardstick yardstick{.hypothesis = hypothesis, .functions = {}};
+  std::size_t function = 0;
+  for (const Column& known : screen.columns) {
+    if (known.hypothesis >= 0) continue;
+    const Eigen::VectorXf& x = kept.function(function++);
+    Column c;
+    c.chain = known.chain;
+    c.norm2 = known.norm2;
+    c.atom_score = c.atom_norm = Eigen::VectorXd::Zero(known.atom_score.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
       const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].atom);
-      column.atom_score[b] -=
-          x[i] * residual[i];  // prediction − measured: an effect that is missing has the other sign
-      column.atom_norm[b] += x[i] * x[i];
-      column.chain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] += x[i] * x[i];
+      const double value = x[i];
+      c.atom_score[b] -= value * residual[i];
+      c.atom_norm[b] += value * value;
     }
-    column.resting = held_by_runs(data, x);
-    const Eigen::VectorXd plain = unfiltered(data, *place.weights, x);
-    for (Eigen::Index i = 0; i < n; ++i)
-      column.plain_norm2[static_cast<int>(data.rows[static_cast<std::size_t>(i)].chain)] +=
-          plain[i] * plain[i];
-    column.norm2 = column.atom_norm.sum();
-    // A third of a percent of a response is how its column was low-passed, not what the effect does.
-    if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
-      column.atom_score.setZero();
-      column.norm2 = 0;
-    }
-    column.score = column.atom_score.sum();
-  };
+    yardstick.functions.push_back(std::move(c));
+  }
+  return yardstick;
+}
 
-  std::vector<Task> tasks;
+Screen screen(const Around& place, const Library& library, const ScreenOptions& options, Responses* kept) {
+  const Prepared& data = place.predictor->data();
+  const Screening screening(place, library, kept);
   // What a tolerance takes up within its bounds is no finding. (Nor could it be tested: the response to a shift of the angle
   // contains the encoder's noise twice.)
   const auto taken_up = [&](const Hypothesis& h) {
@@ -161,91 +340,20 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
     }
     return false;
   };
+  std::vector<std::function<Done()>> tasks;
+  const auto asked = [&](const Hypothesis& h) { return !options.only || options.only->count(h.id()) > 0; };
   for (std::size_t h = 0; h < library.hypotheses.size(); ++h)
-    for (std::size_t s = 0; !taken_up(library.hypotheses[h]) && s < library.hypotheses[h].shapes.size(); ++s)
-      tasks.push_back({static_cast<int>(h), static_cast<int>(s)});
-  const Dictionary generic(data);
-  const std::size_t effects = tasks.size();
-  if (options.dictionary)
-    for (std::size_t d = 0; d < generic.size(); ++d) tasks.push_back({-1, static_cast<int>(d)});
+    if (asked(library.hypotheses[h]) && !taken_up(library.hypotheses[h]) &&
+        !library.hypotheses[h].shapes.empty())
+      tasks.emplace_back([&screening, h] { return screening.effect(static_cast<int>(h)); });
+  if (kept != nullptr) kept->make_room(library.hypotheses.size(), screening.functions());
+  for (std::size_t d = 0; options.dictionary && d < screening.functions(); d += kTogether)
+    tasks.emplace_back(
+        [&screening, d] { return screening.dictionary(d, std::min(d + kTogether, screening.functions())); });
   std::vector<Done> done(tasks.size());
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
-    for (std::size_t t = next++; t < tasks.size(); t = next++) {
-      if (t >= effects) {
-        const auto d = static_cast<std::size_t>(tasks[t].shape);
-        Column c;
-        c.name = generic.name(d);
-        c.chain = generic.chain(d);
-        Eigen::VectorXd rows = generic.rows(d);
-        weigh(data, *place.weights, rows);
-        summarise(rows, c);
-        done[t].columns.push_back(std::move(c));
-        continue;
-      }
-      const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(tasks[t].hypothesis)];
-      const Values& shape = h.shapes[static_cast<std::size_t>(tasks[t].shape)];
-      const std::vector<Values> ways = directions(h, shape);
-      Eigen::MatrixXd x(n, static_cast<Eigen::Index>(ways.size()));
-      std::vector<bool> positive;
-      Done& result = done[t];
-      for (std::size_t a = 0; a < ways.size(); ++a) {
-        Eigen::VectorXd column = response(predictor, *place.fit, place.here, {&h, ways[a]}, *place.weights);
-        Column c;
-        c.hypothesis = tasks[t].hypothesis;
-        c.shape = tasks[t].shape;
-        c.amplitude = static_cast<int>(a);
-        if (!column.allFinite()) column.setZero();
-        summarise(column, c);
-        x.col(static_cast<Eigen::Index>(a)) = column;
-        result.columns.push_back(std::move(c));
-        // An amplitude that cannot change its sign: its bound is at its absence.
-        bool one_way = true;
-        for (int i = 0; i < h.info().parameter_count; ++i) {
-          const auto k = static_cast<std::size_t>(i);
-          if (!h.amplitude[k] || (ways.size() > 1 && ways[a][k] == h.info().parameters[i].null_value))
-            continue;
-          const double null = h.info().parameters[i].null_value;
-          if (h.lower[k] < null && h.upper[k] > null) one_way = false;
-        }
-        positive.push_back(one_way);
-      }
-      const auto m = static_cast<Eigen::Index>(ways.size());
-      Eigen::VectorXd score(m);
-      for (Eigen::Index a = 0; a < m; ++a) score[a] = result.columns[static_cast<std::size_t>(a)].score;
-      const Eigen::MatrixXd gram = x.transpose() * x;
-      const SignedFit linear = signed_fit(gram, score, positive);
-      Screened& s = result.screened;
-      s.hypothesis = tasks[t].hypothesis;
-      s.shape = tasks[t].shape;
-      s.gain = linear.gain;
-      double all = 0;
-      for (std::size_t a = 0; a < ways.size(); ++a) {
-        const double amplitude = linear.amplitude[static_cast<Eigen::Index>(a)];
-        all += amplitude * amplitude * result.columns[a].norm2;
-        for (int c = 0; c < kChains; ++c)
-          s.chain_norm2[c] += amplitude * amplitude * result.columns[a].plain_norm2[c];
-      }
-      // Parts that lie against one another are less together than each by itself.
-      for (double& norm2 : s.chain_norm2) norm2 *= all > 0 ? linear.gain / all : 0.0;
-      s.start = null_values(h, shape);
-      for (std::size_t a = 0; a < ways.size(); ++a) {
-        s.reach = std::max(s.reach, std::sqrt(result.columns[a].norm2));
-        for (int i = 0; i < h.info().parameter_count; ++i) {
-          const auto k = static_cast<std::size_t>(i);
-          const double null = h.info().parameters[i].null_value;
-          if (!std::isfinite(null)) {
-            s.start[k] = shape[k];
-            continue;
-          }
-          if (ways.size() > 1 && ways[a][k] == null) continue;
-          const double factor = h.info().linear || h.info().hook == models::Hook::kTorque
-                                    ? std::clamp(linear.amplitude[static_cast<Eigen::Index>(a)], -50.0, 50.0)
-                                    : std::clamp(linear.amplitude[static_cast<Eigen::Index>(a)], -4.0, 4.0);
-          s.start[k] = std::clamp(null + factor * (shape[k] - null), h.lower[k], h.upper[k]);
-        }
-      }
-    }
+    for (std::size_t t = next++; t < tasks.size(); t = next++) done[t] = tasks[t]();
   };
   std::vector<std::thread> pool;
   for (int i = 1; i < options.threads; ++i) pool.emplace_back(work);
@@ -255,7 +363,7 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   Screen result;
   for (Done& d : done) {
     for (Column& c : d.columns) result.columns.push_back(std::move(c));
-    if (d.screened.hypothesis >= 0) result.shapes.push_back(d.screened);
+    for (Screened& s : d.shapes) result.shapes.push_back(s);
   }
   judge(result, data, library, options);
   return result;

@@ -19,6 +19,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,24 +61,68 @@ struct Screen {
   std::vector<Screened> shapes;      ///< every shape of every hypothesis
   std::vector<Column> columns;       ///< all, without their rows
   double max_T = 0;
-  double p_value = 1;  ///< of the largest T, by flips
-  double limit = 0;    ///< T beyond which a column is significant in this whole search
-  double rare_p = 1;   ///< smallest of all columns
+  double p_value = 1;                      ///< of the largest T, by flips
+  double limit = 0;                        ///< T beyond which a column is significant in this whole search
+  double rare_p = 1;                       ///< smallest of all columns
+  double rare_limit = 0;                   ///< below which a column's is significant in this whole search
+  double chain_p[kChains] = {1, 1, 1, 1};  ///< both tests of what shows in that chain alone
   double noise_unit =
       1;  ///< variance of a score per unit of norm, the middle of all columns: 1 for white rows
 };
 
 struct ScreenOptions {
   int flips = 1999;
-  double significance = 0.005;
+  double significance = 0.005;  ///< of both tests together
   std::uint64_t seed = 1;
   int threads = 2;
-  bool dictionary = false;  ///< the generic functions too
+  bool dictionary = false;                      ///< the generic functions too
+  std::optional<std::set<std::string>> only{};  ///< ids that are looked for; none given: all
 };
 
-[[nodiscard]] Screen screen(const Around& place, const Library& library, const ScreenOptions& options);
-/// The tests once more, after the blocks were cut anew.
-void judge(Screen& screen, const Prepared& data, const Library& library, const ScreenOptions& options);
+/// Weighted responses, as one screen of a search computed them and the next may take them again, where they are the same to first order
+/// beside whatever was added.
+class Responses {
+ public:
+  void make_room(std::size_t hypotheses, std::size_t functions) {
+    effects_.resize(hypotheses);
+    functions_.resize(functions);
+  }
+  /// May a hypothesis' response be kept, or taken, beside this model? A smooth torque's not where forces are read differently. Dry friction
+  /// turns at samples that a tolerance of the angle's clock moves, and an addition moves the tolerances: its response, like a valve's or a
+  /// reading's, not where anything was added to its rows. (Coulomb friction's own, kept, stood beside its own sensitivity with T = 3.)
+  [[nodiscard]] static bool hold(const Fit& fit, const Hypothesis& hypothesis) noexcept;
+  /// Rows × all amplitudes of all shapes; empty: not known yet.
+  [[nodiscard]] Eigen::MatrixXf& effect(int hypothesis);
+  [[nodiscard]] Eigen::VectorXf& function(std::size_t column) { return functions_[column]; }
+  void forget() {
+    effects_.clear();
+    functions_.clear();
+  }
+
+ private:
+  std::vector<Eigen::MatrixXf> effects_;
+  std::vector<Eigen::VectorXf> functions_;
+};
+
+/// `kept`: of the same data, library and weights.
+[[nodiscard]] Screen screen(const Around& place, const Library& library, const ScreenOptions& options,
+                            Responses* kept = nullptr);
+/// What the generic functions score beside one hypothesis, refitted. A rare effect that is large bends the whole fit, and what the fit then
+/// leaves in other blocks would be its own yardstick after all.
+struct Yardstick {
+  int hypothesis = -1;
+  std::vector<Column> functions;
+};
+/// `residual`: of the hypothesis' refit; `kept` holds the functions.
+[[nodiscard]] Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses& kept,
+                                         int hypothesis, const Eigen::VectorXd& residual);
+/// The tests once more, after the blocks were cut anew, or with another yardstick for one hypothesis.
+void judge(Screen& screen, const Prepared& data, const Library& library, const ScreenOptions& options,
+           const Yardstick& yardstick = {});
+
+/// One p-value of the flips' and of the rare columns', which share a level: the smallest level at which either speaks. Up to `level` half
+/// is the flips'; beyond it nearly all. Valid by the union bound, as both shares grow with the level.
+[[nodiscard]] double joint_p(double flips, double rare, double level) noexcept;
 
 /// Orthonormal basis of the fitted parameters' sensitivities.
 [[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);

@@ -6,9 +6,11 @@
 #include <atomic>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <thread>
 
+#include "isac/explain/gate.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/plausible.hpp"
 #include "isac/series/statistics.hpp"
@@ -17,22 +19,33 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kShortlist = 9;
+constexpr std::size_t kContenders = 16;   // of each screen
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
+constexpr double kLargeForSure =
+    25;  // units of noise, five sigma: whoever is so large and not found has too few blocks
 constexpr double kMinimumBlocks = 24;
-constexpr double kConvention = 0.12;     // relative
-constexpr double kKeptPromise = 0.1;     // of the linear gain
+constexpr double kConvention = 0.12;  // relative
+constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
+constexpr double kKeptPromise = 0.1;  // of the linear gain
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kBeaten = 1.645;        // sigma, by functions without a name
+constexpr double kDoubtful =
+    0.02;  // p of what a named model leaves over: a hundredth of what is found is so by chance
+// Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
+constexpr double kWorthDoubting = 0.10, kWorthDoubtingOfPressure = 0.03;
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
 class Search {
  public:
-  Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options)
+  Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options,
+         bool provisional)
       : predictor_(predictor),
         library_(library),
         data_(data),
         options_(options),
+        provisional_(provisional),
+        gate_(data, library, options.significance, options.material),
         ranking_(data, library),
         plausible_(data) {}
 
@@ -42,15 +55,18 @@ class Search {
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     reweight(data_, found_.baseline, found_.weights);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
-    for (const Row& row : data_.rows) ++rows_[static_cast<int>(row.chain)];
     choose_blocks(found_.baseline.residual);
     say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
     place_slip(library_, data_, found_.baseline.residual);
     move_to(found_.baseline);
     take_colour();
     forward();
+    found_.worth_another_look =
+        provisional_ && touches_pressures() && (!found_.adequate || found_.added.size() > 1);
+    if (found_.worth_another_look) return std::move(found_);
     if (found_.added.size() > 1) swap_and_drop();
-    if (found_.adequate && found_.added.size() == 1) hold_against_functions();
+    if (found_.adequate && !found_.added.empty()) hold_against_functions();
+    look_at_remainder();
     if (found_.adequate) leave_half_a_step();
     add_slow_part(noise_of_what_is_left(), found_.floors);
     return std::move(found_);
@@ -59,6 +75,12 @@ class Search {
  private:
   void say(const std::string& line) const {
     if (options_.progress) options_.progress(line);
+  }
+
+  bool touches_pressures() const {
+    return std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
+      return (library_.hypotheses[static_cast<std::size_t>(h)].chains & kPressureChains) != 0;
+    });
   }
 
   void first_weights() {
@@ -85,10 +107,22 @@ class Search {
 
   ScreenOptions screen_options() const {
     return {.flips = 1999,
-            .significance = 0.5 * options_.significance,
+            .significance = options_.significance,
             .seed = options_.seed,
             .threads = options_.threads,
-            .dictionary = true};
+            .dictionary = true,
+            .only = asked_for_};
+  }
+
+  /// What stood anywhere near the top while effects were added: what may take the place of one of them.
+  std::set<std::string> contenders() const {
+    std::set<std::string> ids;
+    for (const Step& step : found_.steps) {
+      for (const Trial& t : step.trials) ids.insert(ranking_.id_of(t));
+      for (std::size_t i = 0; i < std::min(kContenders, step.screen.candidates.size()); ++i)
+        ids.insert(library_.hypotheses[static_cast<std::size_t>(step.screen.candidates[i].hypothesis)].id());
+    }
+    return ids;
   }
 
   void move_to(const Fit& fit) {
@@ -100,13 +134,15 @@ class Search {
   void take_colour() {
     const Eigen::VectorXd left = beside_generic_functions(data_, place_.residual);
     for (int c = 0; c < kChains; ++c)
-      if (rows_[c] > 0) found_.weights.colour[c] = colour_of(data_, left, static_cast<Chain>(c));
+      if (data_.has(static_cast<Chain>(c)))
+        found_.weights.colour[c] = colour_of(data_, left, static_cast<Chain>(c));
     // The same force sensors speak in both.
     const double ratio = found_.weights.sigma[0] / found_.weights.sigma[3];
-    if (rows_[0] > 0 && rows_[3] > 0)
+    if (data_.has(Chain::kTorque) && data_.has(Chain::kMotion))
       found_.weights.colour[3].wander =
           std::max(found_.weights.colour[3].wander, ratio * ratio * found_.weights.colour[0].wander);
     found_.weights.take(data_);
+    responses_.forget();
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(found_.baseline);
   }
@@ -117,68 +153,32 @@ class Search {
     if (!found_.adequate) return left;
     const Eigen::VectorXd plain = unfiltered(data_, found_.weights, found_.model.residual);
     for (int c = 0; c < kChains; ++c)
-      if (rows_[c] > 0) left.colour[c] = colour_of(data_, plain, static_cast<Chain>(c));
+      if (data_.has(static_cast<Chain>(c))) left.colour[c] = colour_of(data_, plain, static_cast<Chain>(c));
     return left;
   }
 
   /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
-  /// candidate leaves over.
+  /// candidate leaves over. So is the yardstick of one that few blocks carry.
   Screen screen_here() {
     choose_blocks(place_.residual);
-    Screen s = screen(place_, library_, screen_options());
+    Screen s = screen(place_, library_, screen_options(), &responses_);
+    if (s.candidates.empty() || s.candidates.front().gain <= 0) return s;
+    const Screened first = s.candidates.front();
     const double before = data_.block_seconds;
-    for (const Screened& c : s.candidates) {
-      if (c.gain <= 0) break;
-      const std::vector<Trial> best = refit_all({c});
-      choose_blocks(best.front().residual);
-      break;
-    }
-    if (data_.block_seconds < before) {
+    const std::vector<Trial> best = refit_all({first});
+    choose_blocks(best.front().residual);
+    if (data_.block_seconds > before) cut_blocks(data_, before);
+    if (!is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit) {
+      judge(s, data_, library_, screen_options(),
+            yardstick_beside(s, data_, responses_, first.hypothesis, best.front().residual));
+    } else if (data_.block_seconds < before) {
       judge(s, data_, library_, screen_options());
-    } else if (data_.block_seconds > before) {
-      cut_blocks(data_, before);
     }
     return s;
   }
 
-  /// Size of the largest response that is significant, over the floor of its chain.
   Gate gate_of(const Screen& s, const std::set<std::string>& ignored = {}) const {
-    Gate gate;
-    gate.p_value = std::min(1.0, 2 * std::min(s.p_value, s.rare_p));
-    gate.significant = gate.p_value <= options_.significance;
-    const auto consider = [&](double amplitude2, const double* norm2, const std::string& what, bool dense) {
-      for (int c = 0; c < kChains; ++c) {
-        if (rows_[c] == 0 || norm2[c] <= 0) continue;
-        const double size = std::sqrt(amplitude2 * norm2[c] / static_cast<double>(rows_[c])) *
-                            found_.weights.sigma[c] / floor_of(c);
-        if (dense) gate.dense_size = std::max(gate.dense_size, size);
-        if (size <= gate.size) continue;
-        gate.size = size;
-        gate.chain = static_cast<Chain>(c);
-        gate.what = what;
-      }
-    };
-    // The first effect's own size is told by its refit; what is left beside one casts doubt already by its linear response.
-    for (const Screened& c : s.candidates)
-      if (c.gain > 0 && significant(c, s) &&
-          ignored.count(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()) == 0)
-        consider(1.0, c.chain_norm2, library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id(),
-                 !found_.added.empty() && c.T >= s.limit);
-    for (const Column& c : s.columns) {
-      if (c.hypothesis >= 0 || c.norm2 <= 0 || c.T < s.limit) continue;
-      consider(c.score * c.score / (c.norm2 * c.norm2), c.plain_norm2, c.name, true);
-    }
-    gate.material = gate.size >= options_.material;
-    return gate;
-  }
-
-  bool significant(const Screened& c, const Screen& s) const {
-    return c.T >= s.limit || c.rare_p <= 0.5 * options_.significance;
-  }
-
-  double floor_of(int chain) const {
-    const double white = found_.floors.white[chain];
-    return std::isfinite(white) && white > found_.weights.sigma[chain] ? white : found_.weights.sigma[chain];
+    return gate_.judge(s, found_.weights, found_.floors, !found_.added.empty(), ignored);
   }
 
   std::vector<Screened> shortlist(const Screen& s) const {
@@ -189,7 +189,7 @@ class Search {
     for (const Screened& c : s.candidates) {
       if (c.gain <= 0) break;
       if (list.size() >= kShortlist) break;
-      if (!significant(c, s) && c.gain < 0.5 * best) continue;
+      if (!is_significant(c, s) && c.gain < 0.5 * best) continue;
       if (c.gain < kWorthRefitting * best && c.gain < kWorthRefittingUnits * s.noise_unit) break;
       if (c.gain < 0.15 * best && list.size() >= 4) break;
       const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
@@ -202,25 +202,8 @@ class Search {
     return list;
   }
 
-  bool a_tolerance_is_held() const {
-    for (std::size_t i = 0; i < found_.model.tolerances; ++i) {
-      const Active& a = found_.model.model.effects[i];
-      const double margin = 0.01 * (a.hypothesis->upper[0] - a.hypothesis->lower[0]);
-      if (std::abs(a.values[0]) < margin) continue;  // absent
-      if (a.values[0] < a.hypothesis->lower[0] + margin || a.values[0] > a.hypothesis->upper[0] - margin)
-        return true;
-    }
-    for (const std::size_t run : predictor_.resting_runs())
-      if (run < found_.model.model.rest.size() &&
-          std::abs(found_.model.model.rest[run]) > 0.98 * data_.rig.angle_step)
-        return true;
-    return false;
-  }
-
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const {
     std::vector<Trial> trials(list.size());
-    // A tolerance at its bound has stood in for what is missing as far as it may: with the effect beside it, it comes back.
-    const bool held = a_tolerance_is_held();
     std::atomic<std::size_t> next{0};
     const auto work = [&] {
       for (std::size_t i = next++; i < list.size(); i = next++) {
@@ -230,19 +213,6 @@ class Search {
         if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
           Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
           if (other.loss < refined.loss) refined = std::move(other);
-        }
-        if (held) {
-          Active active;
-          active.hypothesis = &h;
-          active.values = refined.values;
-          const Fit joint = refit(predictor_, found_.model, {active}, found_.weights, 6);
-          Eigen::VectorXd residual = place_.project(joint.residual);
-          const double loss = residual.squaredNorm();
-          if (loss < refined.loss) {
-            refined.values = joint.model.effects.back().values;
-            refined.residual = std::move(residual);
-            refined.loss = loss;
-          }
         }
         trials[i].hypothesis = list[i].hypothesis;
         trials[i].values = refined.values;
@@ -296,7 +266,9 @@ class Search {
   Step step_here() { return refitted(screened_step()); }
 
   Step refitted(Step step) {
-    if (!step.gate.significant || !step.gate.material) return step;
+    const double least =
+        std::max(options_.material, found_.added.empty() ? 0.0 : kSmallRemainder * first_size_);
+    if (!step.gate.significant || step.gate.size < kWorthALook * least) return step;
     step.trials = refit_all(shortlist(step.screen));
     std::set<std::string> ignored;
     std::erase_if(step.trials, [&](const Trial& t) {
@@ -336,12 +308,12 @@ class Search {
   }
 
   void forward() {
-    double first_size = 0;
+    first_size_ = 0;
     for (;;) {
       Step step = step_here();
       if (found_.steps.empty()) found_.gate = step.gate;
       const bool open = step.gate.significant && step.gate.material &&
-                        (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size);
+                        (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_);
       say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                              "of {:.1f} s)",
                              found_.added.empty() ? "something" : "something more", step.gate.p_value,
@@ -361,8 +333,8 @@ class Search {
         // What is left over after a good name is small; a remainder that needs another name must be as clear as the first,
         // or the first was only like the truth.
         if (take && !found_.added.empty())
-          take = size >= kSecondOfFirst * first_size && size >= kSecondOfFloor;
-        if (take && found_.added.empty()) first_size = size;
+          take = size >= kSecondOfFirst * first_size_ && size >= kSecondOfFloor;
+        if (take && found_.added.empty()) first_size_ = size;
       }
       found_.steps.push_back(std::move(step));
       if (!take) return;
@@ -402,24 +374,49 @@ class Search {
     return false;
   }
 
-  /// A name that functions without one beat is only like the truth, though it leave nothing that a whole search would find.
+  /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
   void hold_against_functions() {
-    const Step& step = found_.steps.front();
-    const GenericFit generic = fit_generic(around(predictor_, found_.baseline, found_.weights), step.screen);
+    const Around baseline = around(predictor_, found_.baseline, found_.weights);
+    const GenericFit generic = fit_generic(baseline, found_.steps.front().screen);
     if (generic.functions.empty()) return;
-    const Trial& named = step.trials.front();
-    const Comparison behind = behind_generic(data_, named.residual, ranking_.parameters_of(named), generic);
+    std::string names;
+    int parameters = 0;
+    for (std::size_t i = 0; i < found_.added.size(); ++i) {
+      const Trial& named = found_.steps[i].trials.front();
+      names += (i > 0 ? " and " : "") + ranking_.id_of(named);
+      // Of those beyond the first, each was the best of many as well.
+      parameters += ranking_.parameters_of(named) + (i > 0 ? kChoosingOne : 0);
+    }
+    const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
+                                                          : baseline.project(found_.model.residual);
+    const Comparison behind = behind_generic(data_, left, parameters, generic);
     if (behind.t < kBeaten || behind.separation < kTwinLimit) {
       say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
-                      ranking_.id_of(named), std::abs(behind.t), behind.t > 0 ? "ahead" : "behind",
-                      behind.separation));
+                      names, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
       return;
     }
     const std::string sentence =
         fmt::format("ruled out: {:.1f} sigma behind functions that have no name", behind.t);
-    found_.notes.push_back({ranking_.id_of(named), sentence});
-    say(ranking_.id_of(named) + ": " + sentence);
+    for (std::size_t i = 0; i < found_.added.size(); ++i)
+      found_.notes.push_back({ranking_.id_of(found_.steps[i].trials.front()), sentence});
+    say(names + ": " + sentence);
     found_.adequate = false;
+  }
+
+  /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
+  void look_at_remainder() {
+    if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
+    Remainder& left = found_.remainder;
+    left.p_value = found_.steps.back().gate.p_value;
+    const Gatekeeper::Sized most =
+        gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
+    left.size = most.size;
+    const bool pressure = (bit(most.chain) & kPressureChains) != 0;
+    left.doubtful = left.p_value <= kDoubtful &&
+                    left.size >= (pressure ? kWorthDoubtingOfPressure : kWorthDoubting) * first_size_;
+    if (left.doubtful)
+      say(fmt::format("what is left is seldom chance: p = {:.2g}, {:.2f} of the noise floor", left.p_value,
+                      left.size));
   }
 
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
@@ -484,6 +481,7 @@ class Search {
     Step last = std::move(found_.steps.back());
     std::vector<Step> steps;
     bool changed = false;
+    asked_for_ = contenders();
     for (std::size_t i = 0; i < chosen.size();) {
       std::vector<Trial> others = chosen;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -503,9 +501,11 @@ class Search {
         changed = true;
       }
       chosen[i] = step.trials.front();
+      step.screen = std::move(found_.steps[steps.size()].screen);  // of everything that was looked for
       steps.push_back(std::move(step));
       ++i;
     }
+    asked_for_.reset();
     found_.added.clear();
     for (const Trial& t : chosen) found_.added.push_back(t.hypothesis);
     move_to(with(chosen));
@@ -524,17 +524,22 @@ class Search {
   Library& library_;
   Prepared& data_;
   const ExplainOptions& options_;
+  bool provisional_;
+  Gatekeeper gate_;
   Ranking ranking_;
   Plausible plausible_;
   Found found_;
-  Around place_;  ///< of found_.model
-  std::size_t rows_[kChains] = {};
+  Around place_;                                    ///< of found_.model
+  std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
+  Responses responses_;
+  double first_size_ = 0;  ///< of the first effect, over the floor
 };
 
 }  // namespace
 
-Found search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options) {
-  return Search(predictor, library, data, options).run();
+Found search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options,
+             bool provisional) {
+  return Search(predictor, library, data, options, provisional).run();
 }
 
 }  // namespace isac::explain

@@ -12,25 +12,24 @@
 #include "isac/explain/compare.hpp"
 #include "isac/explain/explain.hpp"
 #include "isac/explain/floors.hpp"
+#include "isac/explain/gate.hpp"
 #include "isac/explain/ranking.hpp"
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
 
-struct Gate {
-  bool significant = false, material = false;
-  double p_value = 1;
-  double size = 0;  ///< rms of the largest explainable part over the floor, in its best chain
-  Chain chain = Chain::kTorque;
-  std::string what;  ///< whose response that is
-  double dense_size =
-      0;  ///< of the largest generic function (beside an effect: response too) that flips of blocks speak for
-};
-
 struct Step {
   std::vector<Trial> trials;  ///< best first
   Screen screen;
   Gate gate;
+};
+
+/// What a model that is adequate by the search's own level still leaves over.
+struct Remainder {
+  double p_value = 1;
+  double size = 0;  ///< rms over the floor of the most significant response or function
+  bool doubtful =
+      false;  ///< less likely than chance leaves beside the truth, and not negligible: the name may be another's
 };
 
 struct Found {
@@ -41,11 +40,14 @@ struct Found {
   std::vector<int> added;   ///< hypotheses, in order
   bool adequate = true;     ///< nothing significant and material is left
   Gate gate;                ///< of the baseline
+  Remainder remainder;
+  /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
+  bool worth_another_look = false;
   std::vector<TrialNote> notes;
 };
 
-/// `library` gains shapes that only the baseline's residual can tell.
+/// `library` gains shapes that only the baseline's residual can tell. A `provisional` search may end early (worth_another_look).
 [[nodiscard]] Found search(const Predictor& predictor, Library& library, Prepared& data,
-                           const ExplainOptions& options);
+                           const ExplainOptions& options, bool provisional = false);
 
 }  // namespace isac::explain
