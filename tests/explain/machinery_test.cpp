@@ -272,6 +272,33 @@ TEST(Explain, leaves_a_damping_by_the_root_of_the_speed_without_a_name) {
             e.unknown->depends_on.end());
 }
 
+TEST(Explain, says_beside_a_name_that_leaves_something_over_that_it_may_be_none_of_the_catalogue) {
+  // Friction that grows a little with the load, and nothing in the catalogue that does.
+  const test::TiedRig rig{.dry = 0.03, .load_exponent = 0.4};
+  std::vector<PlannedRun> day;
+  for (const auto& [pressure, speed] :
+       {std::pair{2.2, 0.5}, {3.0, 1.0}, {3.8, 0.7}, {3.0, 2.0}, {2.4, 1.5}, {3.6, 0.6}}) {
+    day.push_back(test::by_hand(20, 0.35, speed));
+    day.back().mean_pressure_kgcm2 = pressure;
+  }
+  day.push_back(test::clamped(16, 0.1, 1.2, 6));
+  const Explanation e = explain(test::record_all(rig, day), HeldOut(),
+                                {.rig = rig.facts(),
+                                 .excluded = {"pressure_dependent_friction"},
+                                 .traces = false,
+                                 .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kNotSeparable) << e.summary;
+  EXPECT_EQ(first_of(e), "coulomb_friction");
+  ASSERT_EQ(e.alternatives.size(), 1U);
+  EXPECT_EQ(e.alternatives.front().id, "unknown");
+  EXPECT_GT(e.effects.front().confidence, e.alternatives.front().confidence);
+  EXPECT_LT(e.effects.front().confidence, 0.7);
+  ASSERT_TRUE(e.unknown.has_value());
+  EXPECT_NE(std::find(e.unknown->depends_on.begin(), e.unknown->depends_on.end(), "mean_pressure"),
+            e.unknown->depends_on.end());
+  EXPECT_NE(e.summary.find("does not have cannot be ruled out"), std::string::npos) << e.summary;
+}
+
 TEST(GenericFit, stands_beside_a_name_that_is_right_and_before_one_that_is_not) {
   const test::TiedRig rig{.dry = 0.03};
   Prepared data = prepare(test::record_all(rig, small_day()), rig.facts(), {}, 4.0);

@@ -138,6 +138,40 @@ TEST(Judge, still_sees_what_rests_within_runs_where_the_runs_agree) {
   EXPECT_GE(seen, 190);
 }
 
+TEST(Judge, measures_a_large_rare_effect_by_what_its_refit_leaves_elsewhere) {
+  const Setting setting;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  const auto functions = [&](double scatter) {
+    std::vector<Column> columns(12);
+    for (Column& c : columns) {
+      c.atom_score = c.atom_norm = Eigen::VectorXd::Zero(kBlocks);
+      for (Eigen::Index b = 0; b < c.atom_norm.size(); ++b) {
+        c.atom_norm[b] = 1;
+        c.atom_score[b] = scatter * normal(random);
+      }
+      c.norm2 = c.chain_norm2[0] = kBlocks;
+      c.score = c.atom_score.sum();
+    }
+    return columns;
+  };
+  Column stop;  // thirty sigma of white noise in one block
+  stop.hypothesis = 0;
+  stop.atom_score = stop.atom_norm = Eigen::VectorXd::Zero(kBlocks);
+  stop.atom_norm[3] = stop.norm2 = stop.chain_norm2[0] = 100;
+  stop.atom_score[3] = stop.score = 300;
+  Screen screen;
+  screen.columns = functions(20);  // the baseline has bent towards it, and misses everything else
+  screen.columns.push_back(stop);
+  judge(screen, setting.data, setting.library, {.flips = 99});
+  EXPECT_GT(screen.rare_p, 0.05);
+  judge(screen, setting.data, setting.library, {.flips = 99}, {.hypothesis = 0, .functions = functions(1)});
+  EXPECT_LT(screen.rare_p, 1e-10);
+  // The yardstick is that hypothesis' alone.
+  judge(screen, setting.data, setting.library, {.flips = 99}, {.hypothesis = 1, .functions = functions(1)});
+  EXPECT_GT(screen.rare_p, 0.05);
+}
+
 TEST(JointP, of_two_tests_is_small_no_more_often_than_it_says) {
   constexpr double kLevel = 0.005;
   // The two at their worst: never small together. P(joint ≤ α) = P(flips ≤ f(α)) + P(rare ≤ g(α)).

@@ -80,10 +80,9 @@ ModelPoint plain_baseline(const Predictor& predictor, const Found& found) {
   return fit_baseline(predictor, {}, plain, false).model;
 }
 
-void fill_heldout(const Predictor& predictor, const Found& found, const Proof& proof,
+void fill_heldout(const Predictor& predictor, const ModelPoint& plain, const Proof& proof,
                   std::vector<SignalGap>& signals) {
   if (proof.runs() == 0) return;
-  const ModelPoint plain = plain_baseline(predictor, found);
   for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
     if (!predictor.data().has(chain)) continue;
     const Label label = label_of(predictor.data(), chain);
@@ -92,8 +91,8 @@ void fill_heldout(const Predictor& predictor, const Found& found, const Proof& p
   }
 }
 
-void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof, Chain chain,
-              const BaselineModel& baseline, Gap& gap) {
+void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& plain, const Proof& proof,
+              Chain chain, const BaselineModel& baseline, Gap& gap) {
   const bool pressure = chain == Chain::kPressure1 || chain == Chain::kPressure2;
   const double scale = pressure ? 1 / kPascalPerKgfCm2 : 1.0;
   gap.signal = chain == Chain::kTorque      ? baseline.output
@@ -101,7 +100,7 @@ void fill_gap(const Predictor& predictor, const Found& found, const Proof& proof
                : chain == Chain::kPressure1 ? "p1"
                                             : "p2";
   gap.unit = chain == Chain::kTorque ? baseline.output_unit : pressure ? "kg/cm2" : "N m";
-  const ModelPoint user = found.added.empty() ? found.baseline.model : plain_baseline(predictor, found);
+  const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   gap.before = scale * raw_residual(predictor, user, chain).rms();
   gap.after = scale * raw_residual(predictor, found.model.model, chain).rms();
   const auto c = static_cast<int>(chain);
@@ -214,7 +213,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                           &chain);
   const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
-  fill_gap(predictor, found, proof, chain, options.baseline, e.gap);
+  const ModelPoint plain = plain_baseline(predictor, found);
+  fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
   // A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what
   // anyone would have fitted.
   constexpr double kWorse = 1.002, kWorseThanOwn = 1.01;
@@ -243,7 +243,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
            std::any_of(e.rejected.begin(), e.rejected.end(), is);
   });
   describe(predictor, library, found, proof, options, e);
-  fill_heldout(predictor, found, proof, e.signals);
+  fill_heldout(predictor, plain, proof, e.signals);
   return e;
 }
 
