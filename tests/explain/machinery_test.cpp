@@ -272,6 +272,22 @@ TEST(Explain, leaves_a_damping_by_the_root_of_the_speed_without_a_name) {
             e.unknown->depends_on.end());
 }
 
+TEST(Explain, does_not_say_that_nothing_is_missing_where_only_held_out_runs_show_it) {
+  const test::TiedRig rig, stiff{.dry = 0.08};
+  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), test::by_hand(20, 0.3, 1.5)};
+  const auto answer = [&](const test::TiedRig& later) {
+    return explain(test::record_all(rig, small_day()), HeldOut(test::record_all(later, beyond, 40)),
+                   {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  };
+  const Explanation same = answer(rig), other = answer(stiff);
+  EXPECT_EQ(same.verdict, Verdict::kNone) << same.summary;
+  EXPECT_EQ(other.verdict, Verdict::kUnknown) << other.summary;
+  EXPECT_TRUE(other.effects.empty());
+  ASSERT_TRUE(other.unknown.has_value());
+  EXPECT_EQ(other.unknown->signal, "torque");
+  EXPECT_NE(other.summary.find("the fitted runs do not excite"), std::string::npos) << other.summary;
+}
+
 TEST(Explain, says_beside_a_name_that_leaves_something_over_that_it_may_be_none_of_the_catalogue) {
   // Friction that grows a little with the load, and nothing in the catalogue that does.
   const test::TiedRig rig{.dry = 0.03, .load_exponent = 0.4};

@@ -163,11 +163,6 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
                                             label_of(data, chain).signal, share_in_words(at.front()))});
   if (is_friction(h.effect) && (chain == Chain::kTorque || chain == Chain::kMotion))
     add_widths(predictor, left, chain, c);
-  if (index == 0 && found.remainder.doubtful)
-    c.evidence.push_back(
-        {false, fmt::format("What is left over beside it is no noise, or noise as one day in {:.0f} "
-                            "has it: {} of the noise floor.",
-                            1 / found.remainder.p_value, rounded(found.remainder.size, 2))});
   // The nearest rival, and what told it apart.
   for (std::size_t i = 1; i < step.trials.size(); ++i) {
     const Trial& t = step.trials[i];

@@ -448,6 +448,10 @@ class Search {
       found_.added.back() = trials[i].hypothesis;
       move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
       const double large = kSmallRemainder * trials[i].material;
+      asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
+      const Step nameless = screened_step();
+      asked_for_.reset();
+      if (is_open_at_least(nameless, large)) continue;
       Step rest = screened_step();
       if (is_open_at_least(rest, large)) continue;
       rest = refitted(std::move(rest));
