@@ -111,7 +111,7 @@ runtime::SessionOptions session_of(const Words& words, const Given& given) {
   session.rate = rig_rate ? rig.card.sample_rate : words.rate;
   session.dataset = words.experiment == "all" || words.experiment == "testbed-bundle" ||
                     words.experiment == "calibrate" ||
-                    (!words.plan.empty() && !std::filesystem::exists(session.folder / "rig.toml"));
+                    !std::filesystem::exists(session.folder / "rig.toml");  // so that it can be read as it is
   session.pace_real = words.pace == "real";
   session.raw = words.raw || words.experiment == "calibrate";  // which is about nothing but counts
   session.overwrite = words.overwrite;

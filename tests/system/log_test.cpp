@@ -109,6 +109,7 @@ TEST_F(Log, records_the_whole_of_chapter_three_into_a_dataset) {
 TEST_F(Log, records_torques_that_follow_the_joint_model_of_the_simulated_rig) {
   ASSERT_EQ(
       log({"constant-pressure", "--slow", "--card", "sim:", "--delta-pressure", "-1,1 kg/cm2"}).exit_code, 0);
+  EXPECT_EQ(test::read_text(out("rig.toml")), kRig);  // the folder can be read as it is
   // Two levels, T = A r² φ + B r Δp: the slope gives A, the distance of the lines B. Damping at 0.1π rad/s is both ways.
   const double r = 0.019;
   double slope = 0.0, offset[2] = {};
