@@ -247,13 +247,13 @@ std::string summary_of(const Explanation& e) {
       std::vector<std::string> names = terms_of(e.effects, 3), rivals = terms_of(e.alternatives, 3);
       std::string text = missed(e);
       if (names.empty()) return text + " These data cannot tell what is missing.";
+      const char* close = names.size() > 1 ? "close" : "closes";
       if (e.alternatives.size() == 1 && e.alternatives.front().id == "unknown")
-        return text + fmt::format(
-                          " {} closes it ({}), but leaves over what noise seldom does: {} cannot be "
-                          "ruled out.",
-                          upper_first(joined(names)), closing(e), rivals.front());
+        return text + fmt::format(" {} {} it ({}), but it may also be none of the catalogue. {}",
+                                  upper_first(joined(names)), close, closing(e),
+                                  e.doubts.empty() ? "" : e.doubts.front());
       text +=
-          fmt::format(" {} closes it ({}), but {} cannot be ruled out{}", upper_first(joined(names)),
+          fmt::format(" {} {} it ({}), but {} cannot be ruled out{}", upper_first(joined(names)), close,
                       closing(e), joined(rivals), e.verdict == Verdict::kFamily ? ", all of one kind" : "");
       if (!e.alternatives.empty())
         text += fmt::format(": {} fits only {} sigma worse", e.alternatives.front().name,

@@ -138,15 +138,11 @@ void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
   none.confidence = kNoneOfThem * kSurest;
   e.alternatives.push_back(none);
   e.verdict = Verdict::kNotSeparable;
-  if (found.remainder.doubtful)
-    e.effects.front().evidence.push_back(
-        {false,
-         fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2g} of the noise floor.",
-                     1 / found.remainder.p_value, found.remainder.size)});
+  e.doubts = found.doubts;
   if (closes_little(e.gap))
-    e.effects.front().evidence.push_back(
-        {false, fmt::format("On held-out runs it closes only {:.0f} % of what can be explained.",
-                            100 * std::max(0.0, e.gap.share_closed))});
+    e.doubts.push_back(fmt::format("On held-out runs it closes only {:.0f} % of what can be explained.",
+                                   100 * std::max(0.0, e.gap.share_closed)));
+  for (const std::string& why : e.doubts) e.effects.front().evidence.push_back({false, why});
   if (!left.depends_on.empty()) e.unknown = std::move(left);
 }
 
@@ -263,7 +259,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) {
     leave_unnamed(predictor, found, e);
-  } else if (!e.effects.empty() && (found.remainder.doubtful || closes_little(e.gap))) {
+  } else if (!e.effects.empty() && (!found.doubts.empty() || closes_little(e.gap))) {
     doubt(predictor, found, e);
   }
   if (options.next_experiment && e.verdict != Verdict::kUnknown)

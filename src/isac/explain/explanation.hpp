@@ -147,7 +147,9 @@ struct Explanation {
   std::vector<Region> where;
   std::vector<Candidate> effects;       ///< what was added, in the order added
   std::vector<Candidate> alternatives;  ///< what the data cannot rule out, best first
-  std::vector<Candidate> rejected;      ///< near candidates that were ruled out, nearest first
+  std::vector<std::string>
+      doubts;  ///< sentences: why what was added may be none of the catalogue; then the last alternative is "unknown"
+  std::vector<Candidate> rejected;  ///< near candidates that were ruled out, nearest first
   std::optional<Unknown> unknown;
   std::vector<std::string> not_testable;
   std::vector<CouldHide> could_hide;

@@ -390,6 +390,11 @@ class Search {
     const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
                                                           : baseline.project(found_.model.residual);
     const Comparison behind = behind_generic(data_, left, parameters, generic);
+    if (generic.functions.size() < found_.added.size() && behind.separation < kTwinLimit)
+      found_.doubts.push_back(fmt::format(
+          "Together they do no more than one function without a name ({:.1f} sigma of data between them): it "
+          "may be one thing, and neither of them.",
+          behind.separation));
     if (behind.t < kBeaten || behind.separation < kTwinLimit) {
       say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
                       names, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
@@ -406,17 +411,16 @@ class Search {
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
   void look_at_remainder() {
     if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
-    Remainder& left = found_.remainder;
-    left.p_value = found_.steps.back().gate.p_value;
-    const Gatekeeper::Sized most =
+    const double p = found_.steps.back().gate.p_value;
+    const Gatekeeper::Sized left =
         gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
-    left.size = most.size;
-    const bool pressure = (bit(most.chain) & kPressureChains) != 0;
-    left.doubtful = left.p_value <= kDoubtful &&
-                    left.size >= (pressure ? kWorthDoubtingOfPressure : kWorthDoubting) * first_size_;
-    if (left.doubtful)
-      say(fmt::format("what is left is seldom chance: p = {:.2g}, {:.2f} of the noise floor", left.p_value,
-                      left.size));
+    const bool pressure = (bit(left.chain) & kPressureChains) != 0;
+    if (p > kDoubtful || left.size < (pressure ? kWorthDoubtingOfPressure : kWorthDoubting) * first_size_)
+      return;
+    found_.doubts.push_back(
+        fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
+                    1 / p, left.size));
+    say(found_.doubts.back());
   }
 
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,

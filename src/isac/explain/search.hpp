@@ -24,14 +24,6 @@ struct Step {
   Gate gate;
 };
 
-/// What a model that is adequate by the search's own level still leaves over.
-struct Remainder {
-  double p_value = 1;
-  double size = 0;  ///< rms over the floor of the most significant response or function
-  bool doubtful =
-      false;  ///< less likely than chance leaves beside the truth, and not negligible: the name may be another's
-};
-
 struct Found {
   Fit baseline, model;
   Weights weights;
@@ -40,7 +32,8 @@ struct Found {
   std::vector<int> added;   ///< hypotheses, in order
   bool adequate = true;     ///< nothing significant and material is left
   Gate gate;                ///< of the baseline
-  Remainder remainder;
+  /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
+  std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
   bool worth_another_look = false;
   std::vector<TrialNote> notes;
