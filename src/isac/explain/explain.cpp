@@ -137,6 +137,7 @@ void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
   none.name = "an effect that the catalogue does not have";
   none.subsystem = left.subsystem.empty() ? e.effects.front().subsystem : left.subsystem;
   none.confidence = kNoneOfThem * kSurest;
+  none.behind_best = kNotKnown;  // nothing was fitted
   e.alternatives.push_back(none);
   e.verdict = Verdict::kNotSeparable;
   e.doubts = found.doubts;
