@@ -121,7 +121,7 @@ constexpr double kNoneOfThem = 0.35;  // of the belief, where a name leaves over
 
 /// On runs that it has not seen a model closes about all of what can be explained, if it is the right one.
 bool closes_little(const Gap& gap) {
-  constexpr double kLittle = 0.35,
+  constexpr double kLittle = 0.25,
                    kOpen = 1.10;  // less open than that, and the floor itself is not known well enough
   return gap.heldout_before > kOpen * gap.noise_floor && gap.share_closed < kLittle;
 }
