@@ -33,7 +33,7 @@ constexpr double kBeaten = 1.645;        // sigma, by functions without a name
 constexpr double kDoubtful =
     0.02;  // p of what a named model leaves over: a hundredth of what is found is so by chance
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
-constexpr double kWorthDoubting = 0.10, kWorthDoubtingOfPressure = 0.03;
+constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 
 class Search {
