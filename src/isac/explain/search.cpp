@@ -30,8 +30,7 @@ constexpr double kWorthALook = 0.5;   // of what is material: a refit may be lar
 constexpr double kKeptPromise = 0.1;  // of the linear gain
 constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
 constexpr double kBeaten = 1.645;        // sigma, by functions without a name
-constexpr double kDoubtful =
-    0.02;  // p of what a named model leaves over: a hundredth of what is found is so by chance
+constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
 constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
