@@ -135,8 +135,8 @@ PlantSolution solve(const PlantProblem& problem, const PlantVector& start, LagFo
   s.x = start;
   ceres::Problem p;
   ceres::NumericDiffOptions steps;
-  steps.relative_step_size = 1e-5;
-  auto* cost = new ceres::DynamicNumericDiffCostFunction<Misfit, ceres::CENTRAL>(
+  steps.relative_step_size = 1e-7;
+  auto* cost = new ceres::DynamicNumericDiffCostFunction<Misfit, ceres::FORWARD>(
       new Misfit{problem}, ceres::TAKE_OWNERSHIP, steps);
   cost->AddParameterBlock(kPlantUnknowns);
   cost->SetNumResiduals(static_cast<int>(problem.residuals()));
