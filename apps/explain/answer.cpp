@@ -101,7 +101,9 @@ Json gap_of(const explain::Gap& gap) {
           {"heldout_before", json_number(gap.heldout_before)},
           {"heldout_after", json_number(gap.heldout_after)},
           {"heldout_zero_model", json_number(gap.heldout_zero_model)},
-          {"share_closed", json_number(gap.share_closed)}};
+          {"share_closed", json_number(gap.share_closed)},
+          {"freed_before", json_number(gap.freed_before)},
+          {"freed_after", json_number(gap.freed_after)}};
 }
 
 }  // namespace

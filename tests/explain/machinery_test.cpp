@@ -280,7 +280,7 @@ TEST(Explain, does_not_say_that_nothing_is_missing_where_only_held_out_runs_show
                    {.rig = rig.facts(), .traces = false, .next_experiment = false});
   };
   const Explanation same = answer(rig), other = answer(stiff);
-  EXPECT_EQ(same.verdict, Verdict::kNone) << same.summary;
+  EXPECT_TRUE(same.verdict == Verdict::kNone || same.verdict == Verdict::kImmaterial) << same.summary;
   EXPECT_EQ(other.verdict, Verdict::kUnknown) << other.summary;
   EXPECT_TRUE(other.effects.empty());
   ASSERT_TRUE(other.unknown.has_value());

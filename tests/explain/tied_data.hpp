@@ -25,6 +25,9 @@ struct TiedRig {
   double offset = 0, asymmetry = 0;      // N m at p0 whatever the pressure, and in proportion to it
   double dead_time = 0, second_lag = 0;  // s
   double encoder_play = 0;               // rad, half of it, between joint and encoder
+  double encoder_drift = 0;              // rad/s from eight o'clock on
+  double encoder_slip = 0, slip_at = 0;  // rad, s after eight o'clock
+  double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
   double far_inertia = 0, far_hertz = 15, far_damping = 0.05;  // kg m2 of the inertia, behind a compliance
   double force_noise = 0.3, pressure_noise = 0.004 * kPascalPerKgfCm2;
 
@@ -103,6 +106,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
   char started[40];
   std::snprintf(started, sizeof started, "2026-11-20T%02u:%02u:00Z", 8 + number / 30, 2 * (number % 30));
   out.metadata["started"] = started;
+  const double since_eight = 60 * (60 * (number / 30) + 2 * (number % 30));
+  double zero = rig.zero_wander > 0 ? rig.zero_wander * gauss(random) : 0;
   const char* names[] = {"time", "angle", "p1", "p2", "p1_cmd", "p2_cmd", "F1", "F2"};
   const char* units[] = {"s", "rad", "Pa", "Pa", "Pa", "Pa", "N", "N"};
   for (int c = 0; c < 8; ++c) out.columns.push_back({names[c], units[c], {}});
@@ -120,9 +125,13 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     }
     shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
     if (k % kPerSample == 0 && k < samples * kPerSample) {
-      const double T = torque(velocity), common = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
+      if (rig.zero_wander > 0)
+        zero += -zero * 2e-5 + rig.zero_wander * std::sqrt(4e-5) * gauss(random);  // 500 Hz, 100 s
+      const double T = torque(velocity) + zero, common = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
       const double row[8] = {t,
-                             encoder * std::round(shaft / encoder),
+                             encoder * std::round((shaft + rig.encoder_drift * (since_eight + t) +
+                                                   (since_eight + t >= rig.slip_at ? rig.encoder_slip : 0)) /
+                                                  encoder),
                              p[0] + rig.pressure_noise * gauss(random),
                              p[1] + rig.pressure_noise * gauss(random),
                              command(t, 0),

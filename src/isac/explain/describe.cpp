@@ -137,7 +137,13 @@ std::string missed(const Explanation& e) {
 
 std::string closing(const Explanation& e) {
   const Gap& gap = e.gap;
+  if (std::isfinite(gap.freed_before))
+    return fmt::format("{} → {} on held-out runs, freed of a zero that wanders", rounded(gap.freed_before),
+                       with_unit(gap.freed_after, gap.unit));
   const bool heldout = std::isfinite(gap.heldout_before) && std::isfinite(gap.heldout_after);
+  if (heldout && gap.heldout_after >= gap.heldout_before)
+    return fmt::format("{} → {} on the fitted runs; the held-out ones hardly show it", rounded(gap.before),
+                       with_unit(gap.after, gap.unit));
   const double before = heldout ? gap.heldout_before : gap.before;
   const double after = heldout ? gap.heldout_after : gap.after;
   return fmt::format("{} → {}{}", rounded(before), with_unit(after, gap.unit),

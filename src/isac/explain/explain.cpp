@@ -10,6 +10,7 @@
 #include "isac/core/units.hpp"
 #include "isac/explain/could_hide.hpp"
 #include "isac/explain/describe.hpp"
+#include "isac/explain/doubt.hpp"
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/proof.hpp"
@@ -117,60 +118,6 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
-constexpr double kNoneOfThem = 0.35;  // of the belief, where a name leaves over what chance seldom does
-
-/// On runs that it has not seen a model closes about all of what can be explained, if it is the right one.
-bool closes_little(const Gap& gap) {
-  constexpr double kLittle = 0.25,
-                   kOpen = 1.10;  // less open than that, and the floor itself is not known well enough
-  return gap.heldout_before > kOpen * gap.noise_floor && gap.share_closed < kLittle;
-}
-
-/// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
-void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
-  for (auto* named : {&e.effects, &e.alternatives})
-    for (Candidate& c : *named) c.confidence *= 1 - kNoneOfThem;
-  const Step& last = found.steps.back();
-  Unknown left = describe_unknown(around(predictor, found.model, found.weights), last.screen);
-  Candidate none;
-  none.id = none.form = "unknown";
-  none.name = "an effect that the catalogue does not have";
-  none.subsystem = left.subsystem.empty() ? e.effects.front().subsystem : left.subsystem;
-  none.confidence = kNoneOfThem * kSurest;
-  none.behind_best = kNotKnown;  // nothing was fitted
-  e.alternatives.push_back(none);
-  e.verdict = Verdict::kNotSeparable;
-  e.doubts = found.doubts;
-  if (closes_little(e.gap))
-    e.doubts.push_back(fmt::format("On held-out runs it closes only {:.0f} % of what can be explained.",
-                                   100 * std::max(0.0, e.gap.share_closed)));
-  for (const std::string& why : e.doubts) e.effects.front().evidence.push_back({false, why});
-  if (!left.depends_on.empty()) e.unknown = std::move(left);
-}
-
-/// A model that is right for the fitted runs and far off on the others lacks what only those excite. (Noise that begins anew with every run
-/// made it 1.22 at most in 96 datasets without an effect.)
-void look_beyond_fitted_runs(const Prepared& data, Explanation& e) {
-  constexpr double kFarOff = 1.35;
-  if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
-  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2})
-    for (const SignalGap& s : e.signals) {
-      if (s.signal != label_of(data, chain).signal || !(s.heldout > kFarOff * s.rmse)) continue;
-      e.verdict = Verdict::kUnknown;
-      e.detected = true;
-      e.unknown = Unknown{};
-      e.unknown->subsystem = chain == Chain::kTorque ? "muscle" : "pcu";
-      e.unknown->signal = s.signal;
-      e.unknown->unit = s.unit;
-      e.summary = fmt::format(
-          "Nothing is missing on the fitted runs, but on the held-out ones the {} is {:.3g} {} off, {:.2g} "
-          "times as far: something is missing that the fitted runs do not excite. Put one of those runs "
-          "among them.",
-          s.signal, s.heldout, s.unit, s.heldout / s.rmse);
-      return;
-    }
-}
-
 /// None of the catalogue: what came nearest is told as ruled out, nothing is added.
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
@@ -181,6 +128,7 @@ void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& 
   e.gap.after = e.gap.before;
   e.gap.heldout_after = e.gap.heldout_before;
   e.gap.share_closed = 0;
+  e.gap.freed_before = e.gap.freed_after = kNotKnown;
   if (!found.steps.empty())
     e.unknown =
         describe_unknown(around(predictor, found.baseline, found.weights), found.steps.front().screen);
@@ -191,11 +139,12 @@ void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& 
 Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout,
                     const ExplainOptions& options) {
   check_terms(options.baseline);
-  Prepared data = prepare(runs, options.rig, options.baseline, 4.0);
+  Prepared data = prepare(runs, options.rig, options.baseline, 4.0, heldout.first_start());
   QuietPressure quiet = QuietPressure::learn(data);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
   auto predictor_here = std::make_unique<Predictor>(data);
-  Found found = search(*predictor_here, *library_here, data, options, true);
+  Found found =
+      search(*predictor_here, *library_here, data, options, {.provisional = true, .contenders = {}});
   // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
   std::unique_ptr<Library> first_library;
   if (found.worth_another_look) {
@@ -205,7 +154,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data);
     if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
-    found = search(*predictor_here, *library_here, data, options);
+    found = search(*predictor_here, *library_here, data, options,
+                   {.provisional = false, .contenders = found.contenders});
   }
   const Library& library = *library_here;
   const Predictor& predictor = *predictor_here;
@@ -250,15 +200,9 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
   const ModelPoint plain = plain_baseline(predictor, found);
+  const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
-  // A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what
-  // anyone would have fitted.
-  constexpr double kWorse = 1.002, kWorseThanOwn = 1.01;
-  if (!e.effects.empty() && proof.runs() > 0 &&
-      (proof.residual(found.model.model, chain).rms() >
-           kWorseThanOwn * proof.residual(found.baseline.model, chain).rms() ||
-       e.gap.heldout_after > kWorse * e.gap.heldout_before))
-    e.verdict = Verdict::kUnknown;
+  if (is_refuted(data, found, user, proof, chain, e.gap)) e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) {
     leave_unnamed(predictor, found, e);
   } else if (!e.effects.empty() && (!found.doubts.empty() || closes_little(e.gap))) {
@@ -280,7 +224,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   });
   describe(predictor, library, found, proof, options, e);
   fill_heldout(predictor, plain, proof, e.signals);
-  look_beyond_fitted_runs(data, e);
+  look_beyond_fitted_runs(data, found, proof, e);
   return e;
 }
 

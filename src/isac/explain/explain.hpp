@@ -31,7 +31,7 @@ struct ExplainOptions {
   RigFacts rig{};
   BaselineModel baseline{};
   std::vector<std::string> excluded{};  ///< effects that are not to be considered
-  double significance = 0.005;          ///< of the whole search, for "something is missing"
+  double significance = 0.01;           ///< of the whole search, for "something is missing"
   /// Smaller than this share of the noise floor is immaterial.
   double material = 0.10;
   int most_effects = 3;

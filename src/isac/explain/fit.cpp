@@ -244,28 +244,12 @@ void polish(Rows& rows, const Eigen::VectorXd& lower, const Eigen::VectorXd& upp
     x = better;
 }
 
-void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rounds, bool last) {
-  const auto m = static_cast<Eigen::Index>(fit.coordinates.size());
-  Eigen::VectorXd x(m), lower(m), upper(m);
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const Coordinate& c = fit.coordinates[static_cast<std::size_t>(j)];
-    lower[j] = c.lower / c.scale;
-    upper[j] = c.upper / c.scale;
-    x[j] = fit.value(c) / c.scale;
+/// The model where `x` is, and what it leaves in the rows that were refitted; the others stay.
+void move_to(const Predictor& predictor, const Weights& weights, const Eigen::VectorXd& x, Fit& fit) {
+  for (std::size_t j = 0; j < fit.coordinates.size(); ++j) {
+    const Coordinate& c = fit.coordinates[j];
+    set(fit.model, c, x[static_cast<Eigen::Index>(j)] * c.scale);
   }
-  Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
-  const BoundedFit found =
-      bounded_fit([&](const Eigen::VectorXd& at, Eigen::VectorXd& residual,
-                      Eigen::MatrixXd* jacobian) { return rows.at(at, residual, jacobian); },
-                  x, lower, upper, {.rounds = rounds, .tolerance = 1e-7});
-  fit.converged = found.converged;
-  x = found.x;
-  if (last) polish(rows, lower, upper, x);
-  for (Eigen::Index j = 0; j < m; ++j) {
-    const Coordinate& c = fit.coordinates[static_cast<std::size_t>(j)];
-    set(fit.model, c, x[j] * c.scale);
-  }
-  // The rows that were refitted; the others stay.
   Eigen::VectorXd prediction = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
   predictor.predict(fit.model, fit.chains, prediction);
   prediction -= predictor.measured();
@@ -276,6 +260,33 @@ void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rou
     if ((bit(predictor.data().rows[i].chain) & fit.chains) != 0) fit.residual[k] = prediction[k];
   }
   fit.loss = fit.residual.squaredNorm();
+}
+
+struct Bounded {
+  Eigen::VectorXd x, lower, upper;
+};
+
+Bounded coordinates_of(const Fit& fit) {
+  const auto m = static_cast<Eigen::Index>(fit.coordinates.size());
+  Bounded b{Eigen::VectorXd(m), Eigen::VectorXd(m), Eigen::VectorXd(m)};
+  for (Eigen::Index j = 0; j < m; ++j) {
+    const Coordinate& c = fit.coordinates[static_cast<std::size_t>(j)];
+    b.lower[j] = c.lower / c.scale;
+    b.upper[j] = c.upper / c.scale;
+    b.x[j] = fit.value(c) / c.scale;
+  }
+  return b;
+}
+
+void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rounds) {
+  const Bounded start = coordinates_of(fit);
+  const Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
+  const BoundedFit found =
+      bounded_fit([&](const Eigen::VectorXd& at, Eigen::VectorXd& residual,
+                      Eigen::MatrixXd* jacobian) { return rows.at(at, residual, jacobian); },
+                  start.x, start.lower, start.upper, {.rounds = rounds, .tolerance = 1e-7});
+  fit.converged = found.converged;
+  move_to(predictor, weights, found.x, fit);
 }
 
 /// Chains that hang together with those given through a common parameter.
@@ -318,7 +329,7 @@ Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tole
   for (std::size_t i = 0; i < tolerances.size(); ++i)
     fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
   if (resting_angles) add_rest(predictor, fit.model, kAllChains, fit.coordinates);
-  solve(predictor, fit, weights, 30, false);
+  solve(predictor, fit, weights, 30);
   return fit;
 }
 
@@ -340,7 +351,15 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
   add_rest(predictor, fit.model, fit.chains, fit.coordinates);
   add_effects(fit.model, fit.tolerances, fit.chains, fit.coordinates);
-  solve(predictor, fit, weights, iterations, true);
+  solve(predictor, fit, weights, iterations);
+  return fit;
+}
+
+Fit polished(const Predictor& predictor, Fit fit, const Weights& weights) {
+  Bounded at = coordinates_of(fit);
+  Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
+  polish(rows, at.lower, at.upper, at.x);
+  move_to(predictor, weights, at.x, fit);
   return fit;
 }
 

@@ -45,6 +45,8 @@ struct Fit {
 /// `start.model` with `effects` added at their values, all refitted together.
 [[nodiscard]] Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
                         const Weights& weights, int iterations = 12);
+/// The last steps of a fit, within the bounds that it does not touch, by Ceres.
+[[nodiscard]] Fit polished(const Predictor& predictor, Fit fit, const Weights& weights);
 
 /// Tolerances that stand at a bound: the derivative of the rows by each, and how far it may still go, in its scale.
 struct Held {

@@ -313,6 +313,12 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       h.shapes = slips_between(info, data);
       h.free[1] = false;
     }
+    // Slower than this it is a drift in proportion to time, and others say that with fewer parameters.
+    constexpr double kSlowest = 2;  // of what was recorded
+    const auto no_slower = [&](Hypothesis& o, double recorded) {
+      if (id == "thermal_drift") o.upper[3] = std::clamp(kSlowest * recorded, 2 * o.lower[3], o.upper[3]);
+    };
+    no_slower(h, reach.run_seconds);
     if (!seed) {
       h.seen_by = SeenBy::kForceSensors;
       h.chains = bit(Chain::kTorque);
@@ -338,7 +344,11 @@ Library make_library(const Prepared& data, const std::vector<std::string>& exclu
       also([](Hypothesis& o) { o.seen_by = SeenBy::kMotionOnly, o.chains = bit(Chain::kMotion); });
     if (one_of(id, {"thermal_drift", "force_drift", "encoder_drift"}) &&
         reach.day_seconds > 1.5 * reach.run_seconds)
-      also([](Hypothesis& o) { o.clock = Clock::kDay; });
+      also([&](Hypothesis& o) {
+        o.clock = Clock::kDay;
+        if (id == "thermal_drift") o.upper[3] = info.parameters[3].upper;
+        no_slower(o, reach.day_seconds);
+      });
   }
 
   library.tolerances.reserve(8);  // models point at them, and a search may add some
@@ -438,6 +448,8 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                                               {"encoder_slip", "torque_offset"},
                                               {"encoder_drift", "encoder_offset"},
                                               {"thermal_drift", "torque_offset"},
+                                              {"thermal_drift", "encoder_drift"},
+                                              {"thermal_drift", "force_drift"},
                                               {"gravity_imbalance", "torque_offset"},
                                               {"force_offset", "torque_offset"},
                                               {"pressure_offset", "torque_offset"},

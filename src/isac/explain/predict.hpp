@@ -69,7 +69,7 @@ class Predictor {
   struct Inputs;
   std::shared_ptr<const Inputs> inputs_of(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Inputs> make_inputs(const ModelPoint& model, std::size_t run) const;
-  void undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const;
+  void undo_angle_readings(const ModelPoint& model, std::size_t run, Inputs& in) const;
   void add_columns(std::size_t run, Inputs& in) const;
   std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                                         bool motion) const;

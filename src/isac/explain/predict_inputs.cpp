@@ -1,5 +1,6 @@
 // What enters the equations: the measured signals, freed of what the model says of their sensors.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -98,8 +99,11 @@ void undo_play(double step, double half, std::vector<double>& angle) {
 
 }  // namespace
 
-/// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot.
-void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& run, Inputs& in) const {
+/// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot. A joint that rests stands
+/// still however its reading drifts within a step of the encoder.
+void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, Inputs& in) const {
+  const PreparedRun& run = data_->runs[index];
+  const bool rests = std::find(resting_.begin(), resting_.end(), index) != resting_.end();
   std::vector<const Active*> readings;
   bool smooth = true;
   for (const Active& a : model.effects) {
@@ -122,7 +126,8 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
       for (std::size_t k = 0; k < n; ++k) {
         models::Readings<double> y;
         y.angle = truth[k];
-        models::effect_reading(h.effect, q, time_of(h, run, k), static_cast<const double*>(nullptr), y);
+        models::effect_reading(h.effect, q, time_of(h, run, rests && h.info().linear ? n / 2 : k),
+                               static_cast<const double*>(nullptr), y);
         truth[k] = read[k] - (y.angle - truth[k]);
       }
   }
@@ -142,7 +147,7 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
         return y.angle - angle;
       };
       by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
-      by_time += delta(0, 1) - delta(0, 0);
+      if (!rests) by_time += delta(0, 1) - delta(0, 0);
     }
     const double ratio = 1 / (1 + by_angle);
     for (std::size_t k = 0; k < n; ++k) {
@@ -164,7 +169,8 @@ void Predictor::undo_angle_readings(const ModelPoint& model, const PreparedRun& 
   if (slow) in.slow_acceleration = &in.own_slow_acceleration;
 }
 
-/// Inputs of the last model on this run that changed them the same way: most models of a search differ elsewhere.
+/// Inputs of the models on this run that changed them the same way: most models of a search differ elsewhere. Two are kept, for a search
+/// goes back and forth between the model where it stands and others that read otherwise; the one that was never asked for again goes first.
 std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
                                                               std::size_t index) const {
   std::vector<double> key;
@@ -177,19 +183,23 @@ std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& 
     key.insert(key.end(), a.values.begin(), a.values.end());
   }
   struct Kept {
-    std::uint64_t predictor = 0;
+    std::uint64_t predictor = 0, asked_again = 0;
     std::vector<double> key;
     std::shared_ptr<const Inputs> inputs;
   };
-  thread_local std::vector<Kept> kept;
+  thread_local std::vector<std::array<Kept, 2>> kept;
+  thread_local std::uint64_t now = 0;
   if (kept.size() <= index) kept.resize(index + 1);
-  Kept& k = kept[index];
-  if (k.inputs == nullptr || k.predictor != identity_ || k.key != key) {
-    k.inputs = make_inputs(model, index);
-    k.predictor = identity_;
-    k.key = std::move(key);
-  }
-  return k.inputs;
+  ++now;
+  for (Kept& k : kept[index])
+    if (k.inputs != nullptr && k.predictor == identity_ && k.key == key) {
+      k.asked_again = now;
+      return k.inputs;
+    }
+  Kept& other = kept[index][kept[index][0].asked_again <= kept[index][1].asked_again ? 0 : 1];
+  other = {.predictor = identity_, .asked_again = 0, .key = std::move(key), .inputs = nullptr};
+  other.inputs = make_inputs(model, index);
+  return other.inputs;
 }
 
 std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
@@ -216,7 +226,7 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
       angle = angle || !is_null(a);
     }
   }
-  if (angle) undo_angle_readings(model, run, in);
+  if (angle) undo_angle_readings(model, index, in);
   if (skew != 0) {
     const double shift = skew / dt;
     const std::vector<double> angle_at = *in.angle, velocity_at = *in.velocity,

@@ -30,14 +30,21 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       effects.push_back({&a, {}});
     }
   }
-  const double shift = delay / dt, whole = std::floor(shift), part = shift - whole;
-  const auto command = [&](int i, std::size_t k) {
-    const auto at = static_cast<std::ptrdiff_t>(k) - static_cast<std::ptrdiff_t>(whole);
-    const auto last = static_cast<std::ptrdiff_t>(n) - 1;
-    const auto& u = run.command[i];
-    return (1 - part) * u[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at, 0, last))] +
-           part * u[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(at - 1, 0, last))];
-  };
+  // The commands as they arrive, between two samples where a delay ends there.
+  const auto last = static_cast<std::ptrdiff_t>(n) - 1;
+  const double shift = delay / dt, part = shift - std::floor(shift);
+  const auto whole = static_cast<std::ptrdiff_t>(std::floor(shift));
+  thread_local std::vector<double> arrived[2];
+  for (int i = 0; i < 2; ++i) {
+    arrived[i].resize(n);
+    const double* u = run.command[i].data();
+    for (std::ptrdiff_t k = 0; k <= last; ++k) {
+      const double older = u[std::clamp<std::ptrdiff_t>(k - whole - 1, 0, last)],
+                   newer = u[std::clamp<std::ptrdiff_t>(k - whole, 0, last)];
+      arrived[i][static_cast<std::size_t>(k)] = (1 - part) * newer + part * older;
+    }
+  }
+  const double rate = 1 / lag;
   models::ValvePoint<double> x;
   x.lag = lag;
   const auto rates = [&](const double(&u0)[2], const double(&state)[2], double velocity, double(&v)[2],
@@ -51,7 +58,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       x.command[1] = u[1];
       models::effect_command(e.active->hypothesis->effect, e.active->values.data(), x, e.z, u);
     }
-    for (int i = 0; i < 2; ++i) v[i] = (u[i] - state[i]) / lag;
+    for (int i = 0; i < 2; ++i) v[i] = (u[i] - state[i]) * rate;
     for (const Placed& e : effects)
       models::effect_pressure_rate(e.active->hypothesis->effect, e.active->values.data(), x, e.z, v);
     if (!(move > 0)) return;
@@ -83,7 +90,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   double state[2];  // what a sensor's model makes of its first reading, at the first reading's best value
   for (int i = 0; i < 2; ++i) state[i] = run.first_pressure[i] + (*in.pressure[i])[0] - run.pressure[i][0];
   {
-    const double u0[2] = {command(0, 0), command(1, 0)};
+    const double u0[2] = {arrived[0][0], arrived[1][0]};
     double u[2] = {gain * u0[0], gain * u0[1]};
     for (int i = 0; i < 2; ++i) x.pressure[i] = state[i];
     for (Placed& e : effects) {
@@ -99,13 +106,16 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
            e.active->hypothesis->info().id != std::string_view("valve_hysteresis");
   });
   const int substeps = with_states ? 2 : 1;
+  const bool any_states = std::any_of(effects.begin(), effects.end(), [](const Placed& e) {
+    return e.active->hypothesis->info().state_count > 0;
+  });
   if (effects.empty()) {
     // The same steps for the first-order lag alone, bit for bit.
     for (std::size_t k = 0; k < n; ++k)
       for (int i = 0; i < 2; ++i) {
         p[i][k] = state[i];
-        const double u = gain * command(i, k), middle = state[i] + 0.5 * dt * ((u - state[i]) / lag);
-        state[i] += dt * ((u - middle) / lag);
+        const double u = gain * arrived[i][k], middle = state[i] + 0.5 * dt * ((u - state[i]) * rate);
+        state[i] += dt * ((u - middle) * rate);
       }
     return;
   }
@@ -113,8 +123,8 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
     p[0][k] = state[0];
     p[1][k] = state[1];
     if (k + 1 == n) break;
-    const double u[2] = {command(0, k), command(1, k)};
-    {
+    const double u[2] = {arrived[0][k], arrived[1][k]};
+    if (any_states) {
       // States that only step (play) see the command as the effects before them leave it.
       double chain[2] = {gain * u[0], gain * u[1]};
       x.pressure[0] = state[0];

@@ -420,6 +420,12 @@ void cut_blocks(Prepared& data, double block_seconds) {
   data.blocks = block;
 }
 
+double HeldOut::first_start() const {
+  double first = std::numeric_limits<double>::quiet_NaN();
+  for (const series::Recording& run : runs_) first = std::fmin(first, parse_iso8601(run.meta("started")));
+  return first;
+}
+
 Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig, const BaselineModel& baseline,
                  double block_seconds, double first_start) {
   Prepared data;
@@ -435,7 +441,7 @@ Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig, c
   double first = std::numeric_limits<double>::infinity();
   for (const double t : started)
     if (std::isfinite(t)) first = std::min(first, t);
-  if (std::isfinite(first_start)) first = first_start;
+  if (std::isfinite(first_start)) first = std::min(first, first_start);
   if (std::isfinite(first)) data.first_start = first;
   for (std::size_t r = 0; r < data.runs.size(); ++r)
     data.runs[r].day_offset = std::isfinite(started[r]) && std::isfinite(first) ? started[r] - first : 0;

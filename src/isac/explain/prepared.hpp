@@ -102,12 +102,15 @@ class HeldOut {
   HeldOut() = default;
   explicit HeldOut(std::vector<series::Recording> runs) : runs_(std::move(runs)) {}
   [[nodiscard]] std::size_t size() const noexcept { return runs_.size(); }
+  /// s since 1970 of the first of them, NaN where none says: the day's clock is not evidence.
+  [[nodiscard]] double first_start() const;
 
  private:
   friend class Proof;
   std::vector<series::Recording> runs_;
 };
 
+/// The day's clock begins with the first of `runs`, or at `first_start` if that is earlier.
 [[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
                                const BaselineModel& baseline, double block_seconds,
                                double first_start = std::numeric_limits<double>::quiet_NaN());

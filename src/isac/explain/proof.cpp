@@ -60,6 +60,16 @@ double Sums::signal_rms() const {
   return samples > 0 ? std::sqrt(signal_squares / static_cast<double>(samples)) : kNotKnown;
 }
 
+double weighted_rms(const Prepared& data, const Weights& weights, const Eigen::VectorXd& rows, Chain chain) {
+  double squares = 0, count = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    if (data.rows[i].chain != chain) continue;
+    squares += rows[static_cast<Eigen::Index>(i)] * rows[static_cast<Eigen::Index>(i)];
+    ++count;
+  }
+  return count > 0 ? weights.sigma[static_cast<int>(chain)] * std::sqrt(squares / count) : kNotKnown;
+}
+
 Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain chain) {
   Sums sums;
   for (std::size_t r = 0; r < predictor.data().runs.size(); ++r) {
@@ -147,6 +157,23 @@ ModelPoint Proof::moved_here(const ModelPoint& model) const {
 
 Sums Proof::residual(const ModelPoint& model, Chain chain) const {
   return predictor_ ? raw_residual(*predictor_, moved_here(model), chain) : Sums{};
+}
+
+Proof::Freed Proof::freed(const ModelPoint& first, const ModelPoint& second, const Weights& weights,
+                          Chain chain) const {
+  if (!predictor_) return {};
+  const auto left = [&](const ModelPoint& model) {
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_->rows()));
+    predictor_->predict(moved_here(model), kAllChains, rows);
+    rows -= predictor_->measured();
+    weigh(*data_, weights, rows);
+    for (double& r : rows)
+      if (!std::isfinite(r)) r = 0;
+    return rows;
+  };
+  const Eigen::VectorXd a = left(first), b = left(second);
+  return {compare(*data_, a, b, 0, noise_density(*data_, a)), weighted_rms(*data_, weights, a, chain),
+          weighted_rms(*data_, weights, b, chain)};
 }
 
 std::vector<Series> Proof::series(const ModelPoint& model, Chain chain) const {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "isac/explain/compare.hpp"
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/fit.hpp"
 #include "isac/explain/quiet_pressure.hpp"
@@ -26,6 +27,10 @@ struct Sums {
   [[nodiscard]] double signal_rms() const;
 };
 
+/// rms of weighted rows of one chain, in its unit.
+[[nodiscard]] double weighted_rms(const Prepared& data, const Weights& weights, const Eigen::VectorXd& rows,
+                                  Chain chain);
+
 /// rms of the raw residual of one chain over all runs of a dataset.
 [[nodiscard]] Sums raw_residual(const Predictor& predictor, const ModelPoint& model, Chain chain);
 
@@ -40,6 +45,13 @@ class Proof {
   Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure& quiet = {});
   [[nodiscard]] std::size_t runs() const noexcept { return count_; }
   [[nodiscard]] Sums residual(const ModelPoint& model, Chain chain) const;
+  /// Two models in rows freed of what the noise remembers (weights.hpp).
+  struct Freed {
+    Comparison behind;             ///< of the second, behind the first; all chains
+    double first = 0, second = 0;  ///< rms in the chain, its unit
+  };
+  [[nodiscard]] Freed freed(const ModelPoint& first, const ModelPoint& second, const Weights& weights,
+                            Chain chain) const;
   /// measured − predicted of each run, for what shows at the recording's rate only.
   [[nodiscard]] std::vector<Series> series(const ModelPoint& model, Chain chain) const;
   [[nodiscard]] std::vector<RunTrace> traces(const ModelPoint& before, const ModelPoint& after, Chain chain,

@@ -11,6 +11,7 @@ namespace {
 // Sigma that a general case must lead a simpler one by to stand first, and to stand beside it. If the general one is true and s sigma of
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
+constexpr double kLimitReach = 8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
 }  // namespace
 
@@ -56,7 +57,8 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     for (std::size_t i = 1; i < trials.size(); ++i) {
       const bool twins = trials[i].behind.separation < kTwinLimit;
       const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
-                           (trials[i].behind.t < kNestedLimit || twins || is_limit_case(trials[0]));
+                           (trials[i].behind.t < kNestedLimit || twins ||
+                            (trials[i].behind.t < kLimitReach && is_limit_case(trials[0])));
       const bool fewer = twins && parameters_of(trials[i]) < parameters_of(trials[0]);
       if (!simpler && !fewer) continue;
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),

@@ -72,7 +72,7 @@ struct Screen {
 
 struct ScreenOptions {
   int flips = 1999;
-  double significance = 0.005;  ///< of both tests together
+  double significance = 0.01;  ///< of both tests together
   std::uint64_t seed = 1;
   int threads = 2;
   bool dictionary = false;                      ///< the generic functions too

@@ -38,12 +38,12 @@ constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
 class Search {
  public:
   Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options,
-         bool provisional)
+         const Look& look)
       : predictor_(predictor),
         library_(library),
         data_(data),
         options_(options),
-        provisional_(provisional),
+        look_(look),
         gate_(data, library, options.significance, options.material),
         ranking_(data, library),
         plausible_(data) {}
@@ -60,13 +60,12 @@ class Search {
     move_to(found_.baseline);
     take_colour();
     forward();
-    found_.worth_another_look =
-        provisional_ && touches_pressures() && (!found_.adequate || found_.added.size() > 1);
     if (found_.worth_another_look) return std::move(found_);
     if (found_.added.size() > 1) swap_and_drop();
     if (found_.adequate && !found_.added.empty()) hold_against_functions();
     look_at_remainder();
     if (found_.adequate) leave_half_a_step();
+    if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
     add_slow_part(noise_of_what_is_left(), found_.floors);
     return std::move(found_);
   }
@@ -309,10 +308,13 @@ class Search {
   void forward() {
     first_size_ = 0;
     for (;;) {
+      const bool narrow = !found_.added.empty() && !look_.contenders.empty();
+      if (narrow) asked_for_ = look_.contenders;
       Step step = step_here();
+      asked_for_.reset();
+      if (narrow && !is_open(step)) step = step_here();
       if (found_.steps.empty()) found_.gate = step.gate;
-      const bool open = step.gate.significant && step.gate.material &&
-                        (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_);
+      const bool open = is_open(step);
       say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                              "of {:.1f} s)",
                              found_.added.empty() ? "something" : "something more", step.gate.p_value,
@@ -336,11 +338,48 @@ class Search {
         if (take && found_.added.empty()) first_size_ = size;
       }
       found_.steps.push_back(std::move(step));
+      if (take) {
+        Trial& best = found_.steps.back().trials.front();
+        found_.added.push_back(best.hypothesis);
+        move_to(refit_with(best, found_.steps.back().screen));
+      }
+      // A valve's effect was added, and it is not all that is missing.
+      if (look_.provisional && touches_pressures() && (found_.added.size() > 1 || (!take && open))) {
+        found_.worth_another_look = true;
+        found_.contenders = contenders();
+        return;
+      }
       if (!take) return;
-      const Trial& best = found_.steps.back().trials.front();
-      found_.added.push_back(best.hypothesis);
-      move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
     }
+  }
+
+  /// Beside what was added before. Where in the day the encoder slipped, a linear response cannot say if only runs at rest lie between two
+  /// moments: where they stand within a step takes up what they would tell, but not beyond that step.
+  Fit refit_with(Trial& best, const Screen& s) const {
+    constexpr double kAsLikely = 0.9;  // of the gain
+    constexpr std::size_t kMoment = 1;
+    Fit fit = refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6);
+    if (ranking_.id_of(best) != "encoder_slip") return fit;
+    double most = 0;
+    for (const Screened& shape : s.shapes)
+      if (shape.hypothesis == best.hypothesis) most = std::max(most, shape.gain);
+    for (const Screened& shape : s.shapes) {
+      if (shape.hypothesis != best.hypothesis || shape.gain < kAsLikely * most ||
+          shape.start[kMoment] == best.values[kMoment])
+        continue;
+      Active other = active_of(best);
+      other.values = shape.start;
+      Fit there = refit(predictor_, found_.model, {other}, found_.weights, 6);
+      if (!(there.loss < fit.loss)) continue;
+      best.values = there.model.effects.back().values;
+      fit = std::move(there);
+    }
+    return fit;
+  }
+
+  bool is_open(const Step& step) const {
+    return step.gate.significant && step.gate.material &&
+           (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_);
   }
 
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
@@ -490,6 +529,10 @@ class Search {
     bool changed = false;
     asked_for_ = contenders();
     for (std::size_t i = 0; i < chosen.size();) {
+      if (!changed && i + 1 == chosen.size()) {  // beside all before it: so it was added
+        steps.push_back(std::move(found_.steps[i]));
+        break;
+      }
       std::vector<Trial> others = chosen;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
       found_.added.clear();
@@ -531,7 +574,7 @@ class Search {
   Library& library_;
   Prepared& data_;
   const ExplainOptions& options_;
-  bool provisional_;
+  const Look& look_;
   Gatekeeper gate_;
   Ranking ranking_;
   Plausible plausible_;
@@ -545,8 +588,8 @@ class Search {
 }  // namespace
 
 Found search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options,
-             bool provisional) {
-  return Search(predictor, library, data, options, provisional).run();
+             const Look& look) {
+  return Search(predictor, library, data, options, look).run();
 }
 
 }  // namespace isac::explain

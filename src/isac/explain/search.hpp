@@ -6,6 +6,7 @@
 /// Threads: uses options.threads. Errors: none. Source: docs/derivations/explain.md.
 #pragma once
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,11 +37,19 @@ struct Found {
   std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
   bool worth_another_look = false;
+  std::set<std::string> contenders;  ///< then: ids of what stood near the top of any screen
   std::vector<TrialNote> notes;
 };
 
-/// `library` gains shapes that only the baseline's residual can tell. A `provisional` search may end early (worth_another_look).
+/// Which of two looks at the same data a search is.
+struct Look {
+  bool provisional = false;  ///< may end early (Found::worth_another_look)
+  /// Of an earlier look that ended early: beside an effect these are screened first, all others before anything is said to be left over.
+  std::set<std::string> contenders;
+};
+
+/// `library` gains shapes that only the baseline's residual can tell.
 [[nodiscard]] Found search(const Predictor& predictor, Library& library, Prepared& data,
-                           const ExplainOptions& options, bool provisional = false);
+                           const ExplainOptions& options, const Look& look = {});
 
 }  // namespace isac::explain

@@ -1,0 +1,117 @@
+#include "isac/explain/doubt.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "isac/core/units.hpp"
+#include "isac/explain/labels.hpp"
+#include "isac/explain/unknown.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kNoneOfThem = 0.35;  // of the belief, where a name leaves over what chance seldom does
+
+/// A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what anyone
+/// would have fitted.
+bool does_worse(const Found& found, const Proof& proof, Chain chain, const Gap& gap) {
+  constexpr double kWorse = 1.002, kWorseThanOwn = 1.01;
+  if (proof.runs() == 0) return false;
+  const double own = proof.residual(found.baseline.model, chain).rms();
+  return proof.residual(found.model.model, chain).rms() > kWorseThanOwn * own ||
+         gap.heldout_after > kWorse * gap.heldout_before;
+}
+
+/// A zero that wanders by more than the effect decides which plain rms is larger; freed of it, the rows may speak for the model all the same.
+void free_of_wander(const Prepared& data, const Found& found, const Proof::Freed& freed, Chain chain,
+                    Gap& gap) {
+  constexpr double kShowing = 0.05;  // of the floor's square; a share of less is a share of the floor's error
+  const bool pressure = (bit(chain) & kPressureChains) != 0;
+  const double scale = pressure ? 1 / kPascalPerKgfCm2 : 1.0,
+               told = weighted_rms(data, found.weights, found.model.residual, chain);
+  gap.freed_before = scale * freed.second;
+  gap.freed_after = scale * freed.first;
+  const double open = freed.second * freed.second - told * told;
+  gap.share_closed = open > kShowing * told * told
+                         ? (freed.second * freed.second - freed.first * freed.first) / open
+                         : kNotKnown;
+}
+
+}  // namespace
+
+bool closes_little(const Gap& gap) {
+  constexpr double kLittle = 0.25,
+                   kOpen = 1.10;  // less open than that, and the floor itself is not known well enough
+  return gap.heldout_before > kOpen * gap.noise_floor && gap.share_closed < kLittle;
+}
+
+bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user, const Proof& proof,
+                Chain chain, Gap& gap) {
+  constexpr double kClearly = 2.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
+  constexpr double kAbout = 1.01;                     // where they hardly show the effect, noise decides
+  if (found.added.empty() || proof.runs() == 0) return false;
+  const bool worse = does_worse(found, proof, chain, gap);
+  if (!worse && !closes_little(gap)) return false;
+  const Proof::Freed freed = proof.freed(found.model.model, user, found.weights, chain);
+  if (found.weights.colour[static_cast<int>(chain)].wander > 0 && freed.behind.t >= kClearly &&
+      freed.first < freed.second) {
+    free_of_wander(data, found, freed, chain, gap);
+    return false;
+  }
+  return worse && (gap.heldout_after > kAbout * gap.heldout_before || freed.behind.t < kHardly);
+}
+
+void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
+  for (auto* named : {&e.effects, &e.alternatives})
+    for (Candidate& c : *named) c.confidence *= 1 - kNoneOfThem;
+  const Step& last = found.steps.back();
+  Unknown left = describe_unknown(around(predictor, found.model, found.weights), last.screen);
+  Candidate none;
+  none.id = none.form = "unknown";
+  none.name = "an effect that the catalogue does not have";
+  none.subsystem = left.subsystem.empty() ? e.effects.front().subsystem : left.subsystem;
+  none.confidence = kNoneOfThem * kSurest;
+  none.behind_best = kNotKnown;  // nothing was fitted
+  e.alternatives.push_back(none);
+  e.verdict = Verdict::kNotSeparable;
+  e.doubts = found.doubts;
+  if (closes_little(e.gap))
+    e.doubts.push_back(fmt::format("On held-out runs it closes only {:.0f} % of what can be explained.",
+                                   100 * std::max(0.0, e.gap.share_closed)));
+  for (const std::string& why : e.doubts) e.effects.front().evidence.push_back({false, why});
+  if (!left.depends_on.empty()) e.unknown = std::move(left);
+}
+
+void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Proof& proof, Explanation& e) {
+  constexpr double kFarOff =
+      1.35;  // noise that begins anew with every run made it 1.22 at most in 96 datasets without an effect
+  if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
+  const auto is_far_off = [&](Chain chain, const SignalGap& s) {
+    if (!(s.heldout > kFarOff * s.rmse)) return false;
+    if (!(found.weights.colour[static_cast<int>(chain)].wander > 0)) return true;
+    const ModelPoint& model = found.model.model;
+    return proof.freed(model, model, found.weights, chain).first >
+           kFarOff * weighted_rms(data, found.weights, found.model.residual, chain);
+  };
+  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2})
+    for (const SignalGap& s : e.signals) {
+      if (s.signal != label_of(data, chain).signal || !is_far_off(chain, s)) continue;
+      e.verdict = Verdict::kUnknown;
+      e.detected = true;
+      e.unknown = Unknown{};
+      e.unknown->subsystem = chain == Chain::kTorque ? "muscle" : "pcu";
+      e.unknown->signal = s.signal;
+      e.unknown->unit = s.unit;
+      e.summary = fmt::format(
+          "Nothing is missing on the fitted runs, but on the held-out ones the {} is {:.3g} {} off, {:.2g} "
+          "times as far: something is missing that the fitted runs do not excite. Put one of those runs "
+          "among them.",
+          s.signal, s.heldout, s.unit, s.heldout / s.rmse);
+      return;
+    }
+}
+
+}  // namespace isac::explain

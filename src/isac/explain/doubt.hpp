@@ -1,0 +1,34 @@
+/// @file
+/// What speaks against a name, or against "nothing is missing", once the search has ended: runs that it has not seen, and what is left over.
+///
+///   refuted     rms_after > 1.002 rms_before on held-out runs (or 1.01 of the search's own baseline), and neither
+///                 t ≥ 2 in rows freed of a zero that wanders, nor
+///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides
+///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (search.cpp)
+///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too
+///
+/// t: compare.hpp's, of the user's baseline behind the named model. Units: the answer's. Threads: pure. Errors: none.
+/// Source: docs/derivations/explain.md.
+#pragma once
+
+#include "isac/explain/explanation.hpp"
+#include "isac/explain/proof.hpp"
+#include "isac/explain/search.hpp"
+
+namespace isac::explain {
+
+/// On runs that it has not seen a model closes about all of what can be explained, if it is the right one.
+[[nodiscard]] bool closes_little(const Gap& gap);
+
+/// Is what was named refuted by runs that it has not seen? `user`: the baseline that anyone would have fitted. `gap` gains the freed numbers
+/// where they decide.
+[[nodiscard]] bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user,
+                              const Proof& proof, Chain chain, Gap& gap);
+
+/// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
+void doubt(const Predictor& predictor, const Found& found, Explanation& e);
+
+/// A model that is right for the fitted runs and far off on the others lacks what only those excite.
+void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Proof& proof, Explanation& e);
+
+}  // namespace isac::explain

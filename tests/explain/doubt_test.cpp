@@ -1,0 +1,88 @@
+// What runs that were not fitted may say against a name, and what they may not.
+#include "isac/explain/doubt.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "isac/explain/explain.hpp"
+#include "tied_data.hpp"
+
+namespace isac::explain {
+namespace {
+
+std::vector<PlannedRun> day_of(double seconds) {
+  const PlannedRun steps{.experiment = "pcu-step",
+                         .seconds = 12,
+                         .mean_pressure_kgcm2 = 3,
+                         .pressure_swing_kgcm2 = 1.2,
+                         .pressure_period_s = 4,
+                         .waveform = "steps"};
+  PlannedRun low = test::by_hand(seconds, 0.4, 1.2);
+  low.mean_pressure_kgcm2 = 2.2;
+  PlannedRun high = low;
+  high.mean_pressure_kgcm2 = 3.8;
+  return {steps, test::by_hand(seconds, 0.5, 2.5), low, high, test::by_hand(seconds, 0.3, 0.6)};
+}
+
+const std::vector<PlannedRun> kBeyond = {test::by_hand(20, 0.35, 0.7), test::by_hand(20, 0.3, 1.5)};
+
+Explanation explained(const test::TiedRig& rig, std::vector<PlannedRun> day, std::uint32_t first,
+                      const test::TiedRig& later, std::uint32_t first_later) {
+  return explain(test::record_all(rig, day, first), HeldOut(test::record_all(later, kBeyond, first_later)),
+                 {.rig = rig.facts(), .traces = false, .next_experiment = false});
+}
+
+TEST(HeldOut, does_not_refute_a_name_where_a_zero_wanders_by_more_than_the_effect) {
+  const test::TiedRig rig{.asymmetry = 0.02, .zero_wander = 0.02}, other{.zero_wander = 0.02};
+  const Explanation same = explained(rig, day_of(40), 100, rig, 140);
+  ASSERT_GT(same.gap.heldout_after, 1.5 * same.gap.heldout_before) << "this is the day that is asked for";
+  EXPECT_EQ(same.verdict, Verdict::kNamed) << same.summary;
+  ASSERT_EQ(same.effects.size(), 1U);
+  EXPECT_EQ(same.effects.front().id, "muscle_asymmetry");
+  EXPECT_LT(same.gap.freed_after, 0.99 * same.gap.freed_before);
+  EXPECT_NE(same.summary.find("freed of a zero that wanders"), std::string::npos) << same.summary;
+  // Runs that lack the effect refute it all the same.
+  const Explanation refuted = explained(rig, day_of(40), 100, other, 140);
+  EXPECT_EQ(refuted.verdict, Verdict::kUnknown) << refuted.summary;
+  EXPECT_TRUE(std::isnan(refuted.gap.freed_before));
+}
+
+TEST(HeldOut, that_a_zero_wanders_there_is_nothing_that_fitted_runs_do_not_excite) {
+  const test::TiedRig rig{.zero_wander = 0.02};
+  const Explanation e = explained(rig, day_of(40), 400, rig, 440);
+  const auto torque = std::find_if(e.signals.begin(), e.signals.end(),
+                                   [](const SignalGap& s) { return s.signal == "torque"; });
+  ASSERT_NE(torque, e.signals.end());
+  ASSERT_GT(torque->heldout, 1.5 * torque->rmse) << "this is the day that is asked for";
+  EXPECT_TRUE(e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial) << e.summary;
+}
+
+TEST(Day, begins_with_its_first_run_held_out_or_not) {
+  const test::TiedRig rig{.encoder_drift = 2e-6};
+  const Explanation e = explained(rig, day_of(20), 10, rig, 0);  // twenty minutes later
+  ASSERT_EQ(e.effects.size(), 1U) << e.summary;
+  EXPECT_EQ(e.effects.front().id, "encoder_drift") << e.summary;
+  EXPECT_NEAR(e.effects.front().parameters.front().value, 2e-6, 1e-7);
+}
+
+// A clamped run stands anywhere within a step of the encoder: of one and a half steps it takes up two thirds, and no more.
+TEST(Slip, is_placed_before_a_clamped_run_by_what_that_run_cannot_take_up) {
+  const test::TiedRig rig{.encoder_slip = 1.5 * 6.283185307179586 / 8000, .slip_at = 60 * 24 - 40};
+  std::vector<PlannedRun> day = day_of(25);
+  day.insert(day.begin() + 2, test::clamped(20, 0.1, 1.2, 6));  // at 8:24
+  const Explanation e = explained(rig, day, 10, rig, 0);
+  ASSERT_EQ(e.effects.size(), 1U) << e.summary;
+  EXPECT_EQ(e.effects.front().id, "encoder_slip") << e.summary;
+  ASSERT_EQ(e.effects.front().parameters.size(), 2U);
+  EXPECT_NEAR(e.effects.front().parameters[0].value, rig.encoder_slip, 0.05 * rig.encoder_slip);
+  EXPECT_GT(e.effects.front().parameters[1].value, 60 * 22 + 25);
+  EXPECT_LT(e.effects.front().parameters[1].value, 60 * 24);
+}
+
+}  // namespace
+}  // namespace isac::explain
