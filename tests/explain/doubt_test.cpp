@@ -62,6 +62,14 @@ TEST(HeldOut, that_a_zero_wanders_there_is_nothing_that_fitted_runs_do_not_excit
   EXPECT_TRUE(e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial) << e.summary;
 }
 
+TEST(HeldOut, leaves_nothing_without_doubt_that_a_wandering_zero_alone_made) {
+  const test::TiedRig rig{.zero_wander = 0.02};
+  for (std::uint32_t first = 100; first < 700; first += 100) {
+    const Explanation e = explained(rig, day_of(30), first, rig, first + 40);
+    EXPECT_TRUE(e.effects.empty() || !e.doubts.empty()) << e.summary;
+  }
+}
+
 TEST(Day, begins_with_its_first_run_held_out_or_not) {
   const test::TiedRig rig{.encoder_drift = 2e-6};
   const Explanation e = explained(rig, day_of(20), 10, rig, 0);  // twenty minutes later

@@ -231,12 +231,8 @@ class Search {
     for (const Trial& t : trials) {
       const Trial& best = trials.front();
       const std::string sentence =
-          &t == &best
-              ? fmt::format(
-                    "fits best; closes {:.0f} units of noise, {:.2f} of the floor",
-                    (place_.residual.squaredNorm() - t.loss) /
-                        compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit,
-                    t.material)
+          &t == &best ? fmt::format("fits best; closes {:.0f} units of noise, {:.2f} of the floor",
+                                    units_closed(t), t.material)
           : t.in_set
               ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
                             ranking_.id_of(best), t.behind.t, t.behind.separation)
@@ -340,6 +336,7 @@ class Search {
       found_.steps.push_back(std::move(step));
       if (take) {
         Trial& best = found_.steps.back().trials.front();
+        doubt_if_slight(best);
         found_.added.push_back(best.hypothesis);
         move_to(refit_with(best, found_.steps.back().screen));
       }
@@ -351,6 +348,21 @@ class Search {
       }
       if (!take) return;
     }
+  }
+
+  /// What blocks agree on may still be no more than the noise's own model expects, where that noise is slow.
+  void doubt_if_slight(const Trial& best) {
+    constexpr double kThreeSigma = 9;
+    const double closes = units_closed(best);
+    if (closes >= kThreeSigma) return;
+    found_.doubts.push_back(fmt::format("Beside noise as slow as this {} is only {:.1f} sigma large.",
+                                        ranking_.id_of(best), std::sqrt(std::max(0.0, closes))));
+    say(found_.doubts.back());
+  }
+
+  double units_closed(const Trial& t) const {
+    return (place_.residual.squaredNorm() - t.loss) /
+           compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit;
   }
 
   /// Beside what was added before. Where in the day the encoder slipped, a linear response cannot say if only runs at rest lie between two
