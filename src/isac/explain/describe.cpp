@@ -138,7 +138,7 @@ std::string missed(const Explanation& e) {
 std::string closing(const Explanation& e) {
   const Gap& gap = e.gap;
   if (std::isfinite(gap.freed_before))
-    return fmt::format("{} → {} on held-out runs, freed of a zero that wanders", rounded(gap.freed_before),
+    return fmt::format("{} → {} on held-out runs, freed of the noise's slow part", rounded(gap.freed_before),
                        with_unit(gap.freed_after, gap.unit));
   const bool heldout = std::isfinite(gap.heldout_before) && std::isfinite(gap.heldout_after);
   if (heldout && gap.heldout_after >= gap.heldout_before)

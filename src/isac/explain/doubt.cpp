@@ -25,9 +25,10 @@ bool does_worse(const Found& found, const Proof& proof, Chain chain, const Gap& 
          gap.heldout_after > kWorse * gap.heldout_before;
 }
 
-/// A zero that wanders by more than the effect decides which plain rms is larger; freed of it, the rows may speak for the model all the same.
-void free_of_wander(const Prepared& data, const Found& found, const Proof::Freed& freed, Chain chain,
-                    Gap& gap) {
+/// The noise's slow part, a zero that wanders most of all, may decide which plain rms is larger; freed of it, the rows may speak for the model all
+/// the same.
+void free_of_slow_noise(const Prepared& data, const Found& found, const Proof::Freed& freed, Chain chain,
+                        Gap& gap) {
   constexpr double kShowing = 0.05;  // of the floor's square; a share of less is a share of the floor's error
   const bool pressure = (bit(chain) & kPressureChains) != 0;
   const double scale = pressure ? 1 / kPascalPerKgfCm2 : 1.0,
@@ -45,20 +46,21 @@ void free_of_wander(const Prepared& data, const Found& found, const Proof::Freed
 bool closes_little(const Gap& gap) {
   constexpr double kLittle = 0.25,
                    kOpen = 1.10;  // less open than that, and the floor itself is not known well enough
-  return gap.heldout_before > kOpen * gap.noise_floor && gap.share_closed < kLittle;
+  const bool open = std::isfinite(gap.freed_before) || gap.heldout_before > kOpen * gap.noise_floor;
+  return open && gap.share_closed < kLittle;
 }
 
 bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user, const Proof& proof,
                 Chain chain, Gap& gap) {
-  constexpr double kClearly = 2.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
+  constexpr double kClearly = 3.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
   constexpr double kAbout = 1.01;                     // where they hardly show the effect, noise decides
   if (found.added.empty() || proof.runs() == 0) return false;
   const bool worse = does_worse(found, proof, chain, gap);
   if (!worse && !closes_little(gap)) return false;
   const Proof::Freed freed = proof.freed(found.model.model, user, found.weights, chain);
-  if (found.weights.colour[static_cast<int>(chain)].wander > 0 && freed.behind.t >= kClearly &&
-      freed.first < freed.second) {
-    free_of_wander(data, found, freed, chain, gap);
+  const Colour& colour = found.weights.colour[static_cast<int>(chain)];
+  if ((colour.slow > 0 || colour.wander > 0) && freed.behind.t >= kClearly && freed.first < freed.second) {
+    free_of_slow_noise(data, found, freed, chain, gap);
     return false;
   }
   return worse && (gap.heldout_after > kAbout * gap.heldout_before || freed.behind.t < kHardly);

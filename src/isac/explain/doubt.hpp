@@ -2,7 +2,7 @@
 /// What speaks against a name, or against "nothing is missing", once the search has ended: runs that it has not seen, and what is left over.
 ///
 ///   refuted     rms_after > 1.002 rms_before on held-out runs (or 1.01 of the search's own baseline), and neither
-///                 t ≥ 2 in rows freed of a zero that wanders, nor
+///                 t ≥ 3 in rows freed of the noise's slow part, nor
 ///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides
 ///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (search.cpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too

@@ -110,8 +110,8 @@ struct Gap {
   double heldout_before = kNotKnown, heldout_after = kNotKnown;
   double heldout_zero_model = kNotKnown;  ///< rms of the signal itself: the model that says 0
   double share_closed = kNotKnown;        ///< 1 − (after² − floor²)/(before² − floor²), held-out
-  /// Held-out too, freed of what the noise remembers; known only where a zero wanders by more than the effect, so that it decides which
-  /// plain rms is larger. The share is of these then.
+  /// Held-out too, freed of what the noise remembers; known only where its slow part decides which plain rms is larger. The share is of
+  /// these then.
   double freed_before = kNotKnown, freed_after = kNotKnown;
 };
 

@@ -11,7 +11,8 @@ namespace {
 // Sigma that a general case must lead a simpler one by to stand first, and to stand beside it. If the general one is true and s sigma of
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
-constexpr double kLimitReach = 8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
+constexpr double kLimitReach =
+    8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
 }  // namespace
 

@@ -182,6 +182,7 @@ class Search {
   std::vector<Screened> shortlist(const Screen& s) const {
     std::vector<Screened> list;
     std::map<std::string, int> per_id;
+    std::optional<Screened> slip;
     if (s.candidates.empty()) return list;
     const double best = s.candidates.front().gain;
     for (const Screened& c : s.candidates) {
@@ -196,8 +197,19 @@ class Search {
         continue;
       if (++per_id[h.id()] > 3) continue;
       list.push_back(c);
+      if (h.id() == "encoder_slip") slip = c;
     }
+    if (slip) add_other_moments(*slip, s, list);
     return list;
+  }
+
+  /// The moment of a slip is not refined: those whose linear response does nearly as well are tried as well.
+  static void add_other_moments(const Screened& best, const Screen& s, std::vector<Screened>& list) {
+    constexpr double kNearlyAsWell = 0.6;  // of the gain
+    for (const Screened& other : s.shapes)
+      if (other.hypothesis == best.hypothesis && other.shape != best.shape &&
+          other.gain > kNearlyAsWell * best.gain)
+        list.push_back(other);
   }
 
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const {

@@ -80,11 +80,15 @@ void add_answer(Document& page, const Explanation& e) {
   const bool heldout = std::isfinite(gap.heldout_before), added = !e.effects.empty();
   std::vector<Card> cards = {{"Verdict", verdict_word(e.verdict), chance(e.p_value) + " for “only noise”"}};
   const bool freed = std::isfinite(gap.freed_before);
-  const char* where = freed     ? "rms, held-out runs, freed of a zero that wanders"
+  const char* where = freed     ? "rms, held-out runs, freed of the noise's slow part"
                       : heldout ? "rms, held-out runs"
                                 : "rms, fitted runs";
-  const double before = freed ? gap.freed_before : heldout ? gap.heldout_before : gap.before,
-               after = freed ? gap.freed_after : heldout ? gap.heldout_after : gap.after;
+  const double before = freed     ? gap.freed_before
+                        : heldout ? gap.heldout_before
+                                  : gap.before,
+               after = freed     ? gap.freed_after
+                       : heldout ? gap.heldout_after
+                                 : gap.after;
   cards.push_back({"Gap before", amount(before, gap.unit), where});
   if (added) {
     cards.push_back({"Gap after", amount(after, gap.unit), where});

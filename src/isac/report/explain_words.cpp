@@ -98,7 +98,7 @@ std::string gap_sentence(const Explanation& e) {
     text += " before and " + with_unit(after, gap.unit) + " after";
   if (std::isfinite(gap.noise_floor)) text += "; the noise floor is " + with_unit(gap.noise_floor, gap.unit);
   if (std::isfinite(gap.freed_before))
-    text += "; a zero wanders there by more than the effect: freed of it, " +
+    text += "; the noise's slow part decides which is larger: freed of it, " +
             with_unit(gap.freed_before, gap.unit) + " before and " + with_unit(gap.freed_after, gap.unit) +
             " after";
   if (std::isfinite(gap.share_closed) && !e.effects.empty())
