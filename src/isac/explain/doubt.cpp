@@ -20,7 +20,6 @@ constexpr double kNoneOfThem =
 /// would have fitted.
 bool does_worse(const Found& found, const Proof& proof, Chain chain, const Gap& gap) {
   constexpr double kWorse = 1.002, kWorseThanOwn = 1.01;
-  if (proof.runs() == 0) return false;
   const double own = proof.residual(found.baseline.model, chain).rms();
   return proof.residual(found.model.model, chain).rms() > kWorseThanOwn * own ||
          gap.heldout_after > kWorse * gap.heldout_before;

@@ -347,10 +347,10 @@ class Search {
       }
       found_.steps.push_back(std::move(step));
       if (take) {
-        Trial& best = found_.steps.back().trials.front();
+        const Trial& best = found_.steps.back().trials.front();
         doubt_if_slight(best);
         found_.added.push_back(best.hypothesis);
-        move_to(refit_with(best, found_.steps.back().screen));
+        move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
       }
       // A valve's effect was added, and it is not all that is missing.
       if (look_.provisional && touches_pressures() && (found_.added.size() > 1 || (!take && open))) {
@@ -375,30 +375,6 @@ class Search {
   double units_closed(const Trial& t) const {
     return (place_.residual.squaredNorm() - t.loss) /
            compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit;
-  }
-
-  /// Beside what was added before. Where in the day the encoder slipped, a linear response cannot say if only runs at rest lie between two
-  /// moments: where they stand within a step takes up what they would tell, but not beyond that step.
-  Fit refit_with(Trial& best, const Screen& s) const {
-    constexpr double kAsLikely = 0.9;  // of the gain
-    constexpr std::size_t kMoment = 1;
-    Fit fit = refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6);
-    if (ranking_.id_of(best) != "encoder_slip") return fit;
-    double most = 0;
-    for (const Screened& shape : s.shapes)
-      if (shape.hypothesis == best.hypothesis) most = std::max(most, shape.gain);
-    for (const Screened& shape : s.shapes) {
-      if (shape.hypothesis != best.hypothesis || shape.gain < kAsLikely * most ||
-          shape.start[kMoment] == best.values[kMoment])
-        continue;
-      Active other = active_of(best);
-      other.values = shape.start;
-      Fit there = refit(predictor_, found_.model, {other}, found_.weights, 6);
-      if (!(there.loss < fit.loss)) continue;
-      best.values = there.model.effects.back().values;
-      fit = std::move(there);
-    }
-    return fit;
   }
 
   bool is_open(const Step& step) const {
