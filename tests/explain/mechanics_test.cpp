@@ -62,5 +62,47 @@ TEST(Compliance, within_the_known_inertia_comes_back_although_nobody_saw_its_far
   EXPECT_GT(within.gain, 1.2 * fitted(bench, "inertia_error").gain);
 }
 
+PlannedRun free_run(double period, double swing) {
+  return {.experiment = "free",
+          .seconds = 20,
+          .mean_pressure_kgcm2 = 3,
+          .pressure_swing_kgcm2 = swing,
+          .pressure_period_s = period,
+          .waveform = "steps"};
+}
+
+TEST(ForceLag, of_a_third_of_a_sample_comes_back) {
+  for (const double lag : {0.0006, 0.002, 0.006}) {
+    TiedRig rig;
+    rig.force_lag = lag;
+    const Bench bench(
+        rig, {by_hand(20, 0.35, 3.0), by_hand(20, 0.3, 1.0), test::clamped(20, 0.1, 1.2, 3, "steps")});
+    EXPECT_NEAR(fitted(bench, "sensor_lag").values[0], lag, 0.1 * lag);
+  }
+}
+
+TEST(ForceGain, gains_nothing_by_smoothing_the_noise_of_a_torque_that_is_smooth_already) {
+  TiedRig rig;
+  rig.known_inertia = 0.93 * rig.inertia;
+  const Bench bench(rig, {by_hand(30, 0.35, 3.0), by_hand(30, 0.3, 1.0), test::clamped(30, 0.1, 1.2, 3),
+                          free_run(1.7, 0.6), free_run(2.9, 0.4)});
+  const double inertia = fitted(bench, "inertia_error").gain, forces = fitted(bench, "force_gain_error").gain;
+  EXPECT_GT(inertia, 1000);
+  EXPECT_NEAR(forces, inertia, 12) << "two gains are one inertia, and a parameter more";
+}
+
+TEST(Threshold, that_only_one_run_falls_below_comes_back) {
+  TiedRig rig;
+  rig.threshold = 0.3 * kPascalPerKgfCm2;
+  PlannedRun low = test::clamped(20, 0.1, 0.9, 10);
+  low.mean_pressure_kgcm2 = 1.1;
+  PlannedRun lower = low;
+  lower.mean_pressure_kgcm2 = 0.9;
+  lower.pressure_swing_kgcm2 = 0.85;
+  lower.seconds = 4;
+  const Bench bench(rig, {by_hand(30, 0.35, 1.0), low, lower});
+  EXPECT_NEAR(fitted(bench, "threshold_pressure").values[0], rig.threshold, 0.02 * rig.threshold);
+}
+
 }  // namespace
 }  // namespace isac::explain

@@ -95,6 +95,82 @@ TEST(Colour, is_gone_from_what_the_filter_leaves_and_comes_back_without_it) {
   EXPECT_EQ((again - rows).cwiseAbs().maxCoeff(), 0.0);
 }
 
+/// Torque and motion of the same runs, read by sensors of one zero: y = n + d, y' = n' + 2 d (a σ half as large).
+struct OneZero {
+  Prepared data;
+  Eigen::VectorXd rows;
+  Weights weights;
+
+  explicit OneZero(unsigned seed) {
+    constexpr unsigned kPerRun = 2000;
+    const Prepared torque = rows_of_runs(5, kPerRun);
+    const Eigen::VectorXd d = noise(torque, 0, 0, 1, 9, seed), n = noise(torque, 1, 0, 1, 0, seed + 1),
+                          m = noise(torque, 4, 0, 1, 0, seed + 2);
+    data.runs = torque.runs;
+    for (PreparedRun& run : data.runs)
+      for (unsigned k = 0; k < 4 * (kPerRun + 4); ++k) run.time.push_back(run.interval * k);
+    rows.resize(2 * d.size());
+    data.run_begin = {0};
+    for (unsigned r = 0; r < 5; ++r) {
+      for (const Chain chain : {Chain::kTorque, Chain::kMotion})
+        for (unsigned k = 0; k < kPerRun; ++k) {
+          const auto of = static_cast<Eigen::Index>(r * kPerRun + k);
+          rows[static_cast<Eigen::Index>(data.rows.size())] =
+              d[of] + (chain == Chain::kTorque ? n[of] : m[of]);
+          data.rows.push_back(torque.rows[static_cast<std::size_t>(of)]);
+          data.rows.back().chain = chain;
+        }
+      data.run_begin.push_back(data.rows.size());
+    }
+    weights.sigma[static_cast<int>(Chain::kMotion)] = 2;
+    weights.colour[static_cast<int>(Chain::kTorque)] = {.white = 1, .slow = 0, .memory = 0, .wander = 9};
+    weights.one_zero = true;
+    weights.take(data);
+  }
+};
+
+TEST(OneZero, of_torque_and_motion_is_taken_off_the_motion_and_comes_back) {
+  const OneZero day(5);
+  Eigen::VectorXd plain = day.rows;
+  for (std::size_t i = 0; i < day.data.rows.size(); ++i)
+    plain[static_cast<Eigen::Index>(i)] /= day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+  Eigen::VectorXd rows = day.rows;
+  weigh(day.data, day.weights, rows);
+  double before = 0, after = 0, count = 0;
+  for (std::size_t i = 0; i < day.data.rows.size(); ++i) {
+    if (day.data.rows[i].chain != Chain::kMotion) continue;
+    before += plain[static_cast<Eigen::Index>(i)] * plain[static_cast<Eigen::Index>(i)];
+    after += rows[static_cast<Eigen::Index>(i)] * rows[static_cast<Eigen::Index>(i)];
+    ++count;
+  }
+  EXPECT_GT(before / count, 1.25);        // white of variance one and the zero
+  EXPECT_NEAR(after / count, 1.0, 0.06);  // white, and what the filter does not know of the zero
+  EXPECT_LT((unfiltered(day.data, day.weights, rows) - plain).cwiseAbs().maxCoeff(), 1e-9);
+  const Eigen::VectorXd without = without_shared_zero(day.data, day.weights, plain);
+  for (std::size_t i = 0; i < day.data.rows.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    ASSERT_NEAR(without[k], day.data.rows[i].chain == Chain::kMotion ? rows[k] : plain[k], 1e-12);
+  }
+}
+
+// What the model's torque lacks of what moves the joint is the difference of the two, which no sensor's zero touches.
+TEST(OneZero, leaves_a_constant_of_the_models_torque_as_certain_as_white_noise_does) {
+  double squares = 0;
+  constexpr int kDays = 40;
+  for (unsigned seed = 1; seed <= kDays; ++seed) {
+    const OneZero day(10 * seed);
+    Eigen::VectorXd constant = Eigen::VectorXd::Zero(day.rows.size()), rows = day.rows;
+    for (std::size_t i = 0; i < day.data.rows.size(); ++i)
+      if (day.data.rows[i].chain == Chain::kTorque) constant[static_cast<Eigen::Index>(i)] = 1;
+    weigh(day.data, day.weights, constant);
+    weigh(day.data, day.weights, rows);
+    const double found = constant.dot(rows) / constant.squaredNorm();
+    squares += found * found / kDays;
+  }
+  // Beside the torque alone it has the zero's standard deviation, 3/√5 = 1.3; here white noise of 2 √(1/10 000) and what the zero's steps leave.
+  EXPECT_LT(std::sqrt(squares), 0.1);
+}
+
 TEST(Colour, makes_of_a_jump_what_it_is_worth_beside_noise_that_cannot_jump) {
   // Generalised least squares by the filter against the same by the covariance matrix itself.
   const Prepared data = rows_of_runs(1, 300);

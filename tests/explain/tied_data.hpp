@@ -22,11 +22,14 @@ struct TiedRig {
   double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
   double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 120;  // N at p0: both muscles stay taut
   double dry = 0, load_exponent = 0;                                    // N m, and its power of p_mean/p0
-  double offset = 0, asymmetry = 0;      // N m at p0 whatever the pressure, and in proportion to it
-  double dead_time = 0, second_lag = 0;  // s
-  double encoder_play = 0;               // rad, half of it, between joint and encoder
-  double encoder_drift = 0;              // rad/s from eight o'clock on
-  double encoder_slip = 0, slip_at = 0;  // rad, s after eight o'clock
+  double offset = 0, asymmetry = 0;        // N m at p0 whatever the pressure, and in proportion to it
+  double dead_time = 0, second_lag = 0;    // s
+  double encoder_play = 0;                 // rad, half of it, between joint and encoder
+  double encoder_drift = 0;                // rad/s from eight o'clock on
+  double encoder_slip = 0, slip_at = 0;    // rad, s after eight o'clock
+  double threshold = 0;                    // Pa that lift a bladder off
+  double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
+  double known_inertia = 0;                // kg m2 that is believed; 0: the true one
   double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
   double far_inertia = 0, far_hertz = 15, far_damping = 0.05;  // kg m2 of the inertia, behind a compliance
   double force_noise = 0.3, pressure_noise = 0.004 * kPascalPerKgfCm2;
@@ -35,7 +38,7 @@ struct TiedRig {
     explain::RigFacts f;
     f.wheel_radius = radius;
     f.initial_pressure = p0;
-    f.inertia = inertia;
+    f.inertia = known_inertia > 0 ? known_inertia : inertia;
     f.angle_step = 6.283185307179586 / 8000;
     f.force_noise = force_noise;
     f.pressure_noise = pressure_noise;
@@ -92,9 +95,11 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     steepest += share[i] * tone[i];
   }
   const double omega = hand ? run.peak_speed_rad_s / (run.amplitude_rad * steepest) : 0;
+  double force[2] = {0, 0};
   double angle = middle, velocity = 0, shaft = middle, far_angle = middle, far_velocity = 0;
   const auto torque = [&](double w) {
-    const double dp = 0.5 * (p[1] - p[0]), pm = 0.5 * (p[0] + p[1]);
+    const auto pulling = [&](double pressure) { return std::max(0.0, pressure - rig.threshold); };
+    const double dp = 0.5 * (pulling(p[1]) - pulling(p[0])), pm = 0.5 * (p[0] + p[1]);
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
     return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w - rig.D * w -
            rig.dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset +
@@ -124,10 +129,19 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       }
     }
     shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
+    const double carried = torque(velocity), both_pull = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
+    for (int i = 0; i < 2; ++i) {
+      const double now = both_pull + (i == 0 ? -0.5 : 0.5) * carried / rig.radius;
+      force[i] += k == 0 || !(rig.force_lag > 0) ? now - force[i]
+                                                 : -std::expm1(-kStep / rig.force_lag) * (now - force[i]);
+    }
     if (k % kPerSample == 0 && k < samples * kPerSample) {
       if (rig.zero_wander > 0)
         zero += -zero * 2e-5 + rig.zero_wander * std::sqrt(4e-5) * gauss(random);  // 500 Hz, 100 s
-      const double T = torque(velocity) + zero, common = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
+      const auto read = [&](int i) {
+        const double zeros = (i == 0 ? -0.5 : 0.5) * zero / rig.radius;
+        return std::min(rig.force_most, force[i] + zeros + rig.force_noise * gauss(random));
+      };
       const double row[8] = {t,
                              encoder * std::round((shaft + rig.encoder_drift * (since_eight + t) +
                                                    (since_eight + t >= rig.slip_at ? rig.encoder_slip : 0)) /
@@ -136,8 +150,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
                              p[1] + rig.pressure_noise * gauss(random),
                              command(t, 0),
                              command(t, 1),
-                             common - 0.5 * T / rig.radius + rig.force_noise * gauss(random),
-                             common + 0.5 * T / rig.radius + rig.force_noise * gauss(random)};
+                             read(0),
+                             read(1)};
       for (std::size_t c = 0; c < 8; ++c) out.columns[c].values.push_back(row[c]);
     }
     for (int i = 0; i < 2; ++i) {

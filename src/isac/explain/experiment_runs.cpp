@@ -165,12 +165,14 @@ void press(const series::Program& program, double gain, double lag, PreparedRun&
 bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run) {
   const std::size_t n = run.time.size();
   for (auto& force : run.force) force.resize(n);
+  run.common_force.resize(n);
   double largest = 0, least = range.force_limit;
   for (std::size_t k = 0; k < n; ++k) {
     const double p1 = run.raw_pressure[0][k], p2 = run.raw_pressure[1][k];
     torque.move_to(run.angle[k], run.velocity[k], p1, p2, run.time[k]);
     const double half = 0.5 * torque.baseline(run.velocity[k]) / radius,
                  common = range.common_force(0.5 * (p1 + p2));
+    run.common_force[k] = common;
     run.force[0][k] = common - half;
     run.force[1][k] = common + half;
     largest = std::max(largest, common + std::abs(half));

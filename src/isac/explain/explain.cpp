@@ -143,8 +143,16 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   QuietPressure quiet = QuietPressure::learn(data);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
   auto predictor_here = std::make_unique<Predictor>(data);
-  Found found =
-      search(*predictor_here, *library_here, data, options, {.provisional = true, .contenders = {}});
+  const Look first{.provisional = true, .contenders = {}};
+  Found found = search(*predictor_here, *library_here, data, options, first);
+  if (found.wants_torque_of_free_runs) {
+    if (options.progress)
+      options.progress("the force sensors' zero wanders: free runs tell it beside their motion");
+    add_torque_of_free_runs(data);
+    library_here = std::make_unique<Library>(make_library(data, options.excluded));
+    predictor_here = std::make_unique<Predictor>(data);
+    found = search(*predictor_here, *library_here, data, options, first);
+  }
   // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
   std::unique_ptr<Library> first_library;
   if (found.worth_another_look) {

@@ -17,14 +17,13 @@ using std::string_view;
 
 /// How far the data reaches: what shapes are worth a start.
 struct Reach {
-  double angle_low = 0, angle_high = 0, free_low = 0, free_high = 0, speed = 0, pressure_low = 0,
-         pressure_high = 0, command_high = 0, rate = 0, force = 0, run_seconds = 0, day_seconds = 0,
-         interval = 0.002;
+  double angle_low = 0, angle_high = 0, free_low = 0, free_high = 0, speed = 0, pressure_high = 0,
+         command_high = 0, rate = 0, force = 0, run_seconds = 0, day_seconds = 0, interval = 0.002;
+  std::vector<double> pressure_lows;  ///< of each muscle in each run, lowest first
 };
 
 Reach reach_of(const Prepared& data) {
   Reach reach;
-  reach.pressure_low = 1e12;
   std::vector<double> rates;
   for (const PreparedRun& run : data.runs) {
     if (run.interval > 0) reach.interval = run.interval;
@@ -36,12 +35,13 @@ Reach reach_of(const Prepared& data) {
       reach.free_high = std::max(reach.free_high, v);
     }
     for (const double w : run.velocity) reach.speed = std::max(reach.speed, std::abs(w));
-    for (const auto& p : run.pressure)
+    for (const auto& p : run.pressure) {
+      if (!p.empty()) reach.pressure_lows.push_back(*std::min_element(p.begin(), p.end()));
       for (std::size_t k = 0; k < p.size(); ++k) {
-        reach.pressure_low = std::min(reach.pressure_low, p[k]);
         reach.pressure_high = std::max(reach.pressure_high, p[k]);
         if (k >= 5) reach.rate = std::max(reach.rate, std::abs(p[k] - p[k - 5]) / (5 * run.interval));
       }
+    }
     for (const auto& u : run.command)
       for (const double v : u) reach.command_high = std::max(reach.command_high, v);
     for (const auto& f : run.force)
@@ -51,6 +51,7 @@ Reach reach_of(const Prepared& data) {
       reach.day_seconds = std::max(reach.day_seconds, run.day_offset + run.time.back());
     }
   }
+  std::sort(reach.pressure_lows.begin(), reach.pressure_lows.end());
   return reach;
 }
 
@@ -92,8 +93,16 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "supply_droop" && at == 2) return {1.0};
   if (id == "supply_sag" && at == 1) return {0.25, 0.8};
   if (id == "threshold_pressure" && at == 0) {
-    const double low = std::max(0.1 * bar, r.pressure_low);
-    return {0.5 * low, 1.3 * low};
+    // Nothing is seen of it where no pressure falls below: starts just above what the muscles fell to, run by run.
+    constexpr std::size_t kStarts = 5;
+    std::vector<double> grid;
+    for (const double low : r.pressure_lows)
+      if (const double start = 1.3 * std::max(0.1 * bar, low);
+          grid.empty() || (start > 1.3 * grid.back() && grid.size() < kStarts))
+        grid.push_back(start);
+    if (grid.empty()) return {};
+    grid.push_back(0.4 * grid.front());
+    return grid;
   }
   if (id == "dead_time" && at == 0) return {0.006, 0.02};
   if (id == "second_order_lag" && at == 0) return {0.006, 0.03};

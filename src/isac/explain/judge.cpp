@@ -290,9 +290,12 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     s.T = t.T;
     s.rare_p = t.rare_p;
     Screened& b = best[static_cast<std::size_t>(s.hypothesis)];
-    const double reach = std::max(b.reach, s.reach);
+    const double reach = std::max(b.reach, s.reach), T = std::max(b.T, s.T),
+                 rare_p = b.hypothesis < 0 ? s.rare_p : std::min(b.rare_p, s.rare_p);
     if (b.hypothesis < 0 || s.gain > b.gain) b = s;
     b.reach = reach;
+    b.T = T;  // what any of its shapes shows: the whole search's p is of all of them
+    b.rare_p = rare_p;
   }
   result.candidates.clear();
   for (const Screened& s : best)

@@ -108,6 +108,12 @@ bool reads_force(const ModelPoint& model) {
                      [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
 }
 
+bool clips_force(const ModelPoint& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
+    return a.hypothesis->reads_force && !a.hypothesis->amplitude[0] && !is_null(a);
+  });
+}
+
 }  // namespace
 
 void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned chains,
@@ -122,17 +128,24 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       if (data_->rows[i].chain == chain) out[static_cast<Eigen::Index>(i)] = value(data_->rows[i].sample);
   };
   if ((chains & bit(Chain::kTorque)) != 0 && run.has_torque) {
-    std::vector<double> extra = torque_of_effects(model, run, in, false);
+    std::vector<double> extra = torque_of_effects(model, run, in, false), smooth;
     if (reads_force(model)) {
-      std::vector<double> torque(run.time.size());
-      for (std::size_t k = 0; k < torque.size(); ++k)
-        torque[k] = base_torque(model, in, k) + (extra.empty() ? 0.0 : extra[k]);
-      std::vector<double> change(torque.size(), 0.0);
-      read_forces(model, run, torque, change);
-      if (extra.empty()) {
-        extra = std::move(change);
-      } else {
-        for (std::size_t k = 0; k < change.size(); ++k) extra[k] += change[k];
+      // A torque of low-passed signals is low-passed already: a gain or a lag must not smooth its noise once more, or it would gain by that. (An
+      // inertia of 6 % too much was called a force sensor's gain.) Effects' torques and clipped readings jump, and pass the kernel after that.
+      if (!extra.empty()) extra = low_pass(extra, data_->smoothing.torque / run.interval);
+      smooth = std::move(extra);
+      smooth.resize(run.time.size());
+      std::vector<double> torque(smooth.size()), change(smooth.size(), 0.0);
+      for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = base_torque(model, in, k) + smooth[k];
+      read_forces(model, run, Reading::kSmooth, torque, change);
+      for (std::size_t k = 0; k < change.size(); ++k) {
+        smooth[k] += change[k];
+        torque[k] += change[k];
+      }
+      extra.clear();
+      if (clips_force(model)) {
+        extra.assign(torque.size(), 0.0);
+        read_forces(model, run, Reading::kClipped, torque, extra);
       }
     }
     const double* column = in.columns.data();
@@ -142,12 +155,10 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       for (std::size_t j = 0; j < terms_.size(); ++j) sum += model.base[j] * *column++;
       return sum;
     };
-    if (extra.empty()) {
-      for_rows(Chain::kTorque, [&](std::size_t) { return base(); });
-    } else {
-      const Kernel kernel(data_->smoothing.torque / run.interval);
-      for_rows(Chain::kTorque, [&](std::size_t k) { return base() + kernel(extra, k); });
-    }
+    const Kernel kernel(data_->smoothing.torque / run.interval);
+    for_rows(Chain::kTorque, [&](std::size_t k) {
+      return base() + (smooth.empty() ? 0.0 : smooth[k]) + (extra.empty() ? 0.0 : kernel(extra, k));
+    });
   }
   if ((chains & bit(Chain::kMotion)) != 0 && run.is_free && !run.slow_acceleration.empty()) {
     std::vector<double> extra = torque_of_effects(model, run, in, true);
@@ -158,7 +169,8 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       for (std::size_t k = 0; k < torque.size(); ++k)
         torque[k] = inertia * (*in.acceleration)[k] + (extra.empty() ? 0.0 : extra[k]);
       std::vector<double> change(torque.size(), 0.0);
-      read_forces(model, run, torque, change);
+      read_forces(model, run, Reading::kSmooth, torque, change);
+      read_forces(model, run, Reading::kClipped, torque, change);
       if (extra.empty()) {
         extra = std::move(change);
       } else {
@@ -232,7 +244,8 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
       rate.torque[k] = resting + base_torque(model, in, k) + (extra.empty() ? 0.0 : extra[k]);
     if (reads) {
       std::vector<double> change(rate.torque.size(), 0.0);
-      read_forces(model, run, rate.torque, change);
+      read_forces(model, run, Reading::kSmooth, rate.torque, change);
+      read_forces(model, run, Reading::kClipped, rate.torque, change);
       for (std::size_t k = 0; k < change.size(); ++k) rate.torque[k] += change[k];
     }
   }
@@ -245,7 +258,8 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
       rate.motion[k] = data_->rig.inertia * (*in.slow_acceleration)[k] - (extra.empty() ? 0.0 : extra[k]);
     if (reads) {
       std::vector<double> change(rate.motion.size(), 0.0);
-      read_forces(model, run, rate.motion, change);
+      read_forces(model, run, Reading::kSmooth, rate.motion, change);
+      read_forces(model, run, Reading::kClipped, rate.motion, change);
       for (std::size_t k = 0; k < change.size(); ++k) rate.motion[k] += change[k];
     }
   }

@@ -76,8 +76,9 @@ class Predictor {
   double base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const;
   void pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                     std::vector<double> (&p)[2]) const;
-  void read_forces(const ModelPoint& model, const PreparedRun& run, const std::vector<double>& torque,
-                   std::vector<double>& change) const;
+  enum class Reading { kSmooth, kClipped };
+  void read_forces(const ModelPoint& model, const PreparedRun& run, Reading which,
+                   const std::vector<double>& torque, std::vector<double>& change) const;
 
   const Prepared* data_;
   std::uint64_t identity_ = 0;  ///< of this predictor among all, for what a thread keeps

@@ -23,6 +23,10 @@ namespace isac::explain {
 [[nodiscard]] inline double growth(double s) {
   return std::abs(s) < 0.03 ? 1 + s * (0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120))) : std::expm1(s) / s;
 }
+/// (growth(s) − 1)/s: the same for an input that rises evenly over the step.
+[[nodiscard]] inline double growth_of_ramp(double s) {
+  return std::abs(s) < 0.03 ? 0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120)) : (growth(s) - 1) / s;
+}
 
 /// Of the baseline, what effects that bend it need: A, B, C, D.
 struct BaselineOfPoint {

@@ -167,8 +167,8 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
 }
 
 /// What sensors of the force make of a torque: added to `change`. The forces are half of the torque on either side of their
-/// measured sum, whose noise is not that of the torque; where a reading is clipped, what the other sensor leaves for it.
-void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
+/// measured sum, low-passed, whose noise is not that of the torque; where a reading is clipped, what the other sensor leaves for it.
+void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run, Reading which,
                             const std::vector<double>& torque, std::vector<double>& change) const {
   if (run.force[0].empty()) return;
   const double r = data_->rig.wheel_radius;
@@ -177,6 +177,7 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
     if (!h.reads_force || is_null(a)) continue;
     double z[models::kMaxEffectStates] = {};
     const bool memory = h.info().state_count > 0, clips = !h.amplitude[0];
+    if (clips != (which == Reading::kClipped)) continue;
     double last[2] = {0, 0};
     for (std::size_t k = 0; k < torque.size(); ++k) {
       models::Readings<double> y;
@@ -185,7 +186,7 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
         y.force[0] = run.force[1][k] - load;
         y.force[1] = run.force[0][k] + load;
       } else {
-        const double common = memory ? 0.0 : 0.5 * (run.force[0][k] + run.force[1][k]);
+        const double common = memory ? 0.0 : run.common_force[k];
         y.force[0] = common - 0.5 * load;
         y.force[1] = common + 0.5 * load;
       }
@@ -194,15 +195,17 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run,
         if (k == 0) {
           models::effect_reading_rest(h.effect, a.values.data(), y, z);
         } else {
-          // First-order in its state: exponential step on the mean input of the sample.
-          models::Readings<double> middle = y;
-          for (int i = 0; i < 2; ++i) middle.force[i] = 0.5 * (last[i] + before[i]);
-          double f[2] = {}, g[2] = {}, nudged[2] = {z[0] + 1e-6, z[1] + 1e-6};
-          models::effect_reading_derivative(h.effect, a.values.data(), middle, z, f);
-          models::effect_reading_derivative(h.effect, a.values.data(), middle, nudged, g);
+          // First-order in its state and its input: the step is exact for a force that is straight between samples. (On the
+          // mean of the two no lag came out shorter than half a sample.)
+          models::Readings<double> from = y;
+          for (int i = 0; i < 2; ++i) from.force[i] = last[i];
+          double first[2] = {}, then[2] = {}, moved[2] = {}, nudged[2] = {z[0] + 1e-6, z[1] + 1e-6};
+          models::effect_reading_derivative(h.effect, a.values.data(), from, z, first);
+          models::effect_reading_derivative(h.effect, a.values.data(), y, z, then);
+          models::effect_reading_derivative(h.effect, a.values.data(), y, nudged, moved);
           for (int i = 0; i < 2; ++i) {
-            const double slope = (g[i] - f[i]) / 1e-6 * run.interval;
-            z[i] += run.interval * f[i] * growth(slope);
+            const double slope = (moved[i] - then[i]) / 1e-6 * run.interval;
+            z[i] += run.interval * (growth(slope) * first[i] + growth_of_ramp(slope) * (then[i] - first[i]));
           }
         }
         last[0] = before[0];

@@ -146,6 +146,10 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     run.force[0] = take("F1");
     run.force[1] = take("F2");
     if (run.force[0].empty() || run.force[1].empty()) run.force[0] = run.force[1] = {};
+    run.common_force = run.force[0];
+    for (std::size_t k = 0; k < run.common_force.size(); ++k)
+      run.common_force[k] = 0.5 * (run.force[0][k] + run.force[1][k]);
+    if (!run.common_force.empty()) run.common_force = low_pass(run.common_force, sigma);
   }
   if (!run.force[0].empty() && std::isfinite(rig.wheel_radius)) {
     run.torque = series::torque_from_forces(run.force[0], run.force[1], rig.wheel_radius);
@@ -202,7 +206,7 @@ void add_rows(Prepared& data) {
     all += run.time.back();
     if (!run.is_free) driven += run.time.back();
   }
-  const bool driven_enough = seed && driven >= 0.4 * all;
+  const bool driven_enough = seed && !data.with_free_torque && driven >= 0.4 * all;
   for (std::size_t r = 0; r < data.runs.size(); ++r) {
     const PreparedRun& run = data.runs[r];
     const auto stride = static_cast<std::size_t>(data.stride);
@@ -210,9 +214,12 @@ void add_rows(Prepared& data) {
       if (!there) return;
       const std::vector<unsigned char>& fit =
           chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable;
+      const bool moving_only =
+          chain == Chain::kMotion || (chain == Chain::kTorque && run.is_free && data.with_free_torque);
       for (std::size_t k = 0; k < run.time.size(); k += step)
-        // A joint that rests is held by any friction it has: its balance tells nothing there.
-        if (fit[k] != 0 && run.time[k] >= skip && (chain != Chain::kMotion || run.dry_velocity[k] != 0))
+        // A joint that rests is held by any friction it has: its balance tells nothing there. And it rests anywhere within a step of
+        // the encoder, as far off in torque as a zero wanders.
+        if (fit[k] != 0 && run.time[k] >= skip && (!moving_only || run.dry_velocity[k] != 0))
           data.rows.push_back({.run = static_cast<unsigned>(r),
                                .sample = static_cast<unsigned>(k),
                                .atom = 0,
@@ -391,6 +398,19 @@ std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<co
     out[k] = std::abs(w) > still ? w : 0.0;
   }
   return out;
+}
+
+bool can_add_torque_of_free_runs(const Prepared& data) {
+  return !data.with_free_torque && data.has(Chain::kMotion) &&
+         std::none_of(data.rows.begin(), data.rows.end(), [&](const Row& row) {
+           return row.chain == Chain::kTorque && data.runs[row.run].is_free;
+         });
+}
+
+void add_torque_of_free_runs(Prepared& data) {
+  data.with_free_torque = true;
+  add_rows(data);
+  cut_blocks(data, data.block_seconds);
 }
 
 void cut_blocks(Prepared& data, double block_seconds) {

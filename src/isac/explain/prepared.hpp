@@ -62,6 +62,7 @@ struct PreparedRun {
   double first_pressure[2] = {0, 0};  ///< Pa, where each began, from as long as its command stood still
   std::vector<double> command[2];     ///< Pa as recorded
   std::vector<double> force[2];       ///< N as read; empty where only the torque is known
+  std::vector<double> common_force;   ///< N, half the sum of the two, low-passed
   std::vector<double> torque;         ///< N m (or the output's unit) as read
   std::vector<double> smooth_torque;  ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
@@ -92,6 +93,7 @@ struct Prepared {
   double first_start =
       std::numeric_limits<double>::quiet_NaN();  ///< s since 1970 of the day's first run, where known
   int stride = 1;                                ///< samples per row
+  bool with_free_torque = false;                 ///< see add_torque_of_free_runs
 
   [[nodiscard]] bool has(Chain chain) const noexcept;
 };
@@ -114,6 +116,10 @@ class HeldOut {
 [[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
                                const BaselineModel& baseline, double block_seconds,
                                double first_start = std::numeric_limits<double>::quiet_NaN());
+/// Free runs give rows of the torque as well, though driven ones would suffice: beside a zero of the force sensors that wanders they tell more
+/// together with the motion (weights.hpp, `one_zero`) than the joint's own noise in the angle biases. False if there are none to add.
+[[nodiscard]] bool can_add_torque_of_free_runs(const Prepared& data);
+void add_torque_of_free_runs(Prepared& data);
 /// Joins atoms to blocks of about this length anew.
 void cut_blocks(Prepared& data, double block_seconds);
 

@@ -141,6 +141,7 @@ Proof::Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure
   } catch (const Error&) {
     return;  // nothing in them can be compared
   }
+  if (fitted.with_free_torque && can_add_torque_of_free_runs(*data_)) add_torque_of_free_runs(*data_);
   quiet.apply(*data_);
   predictor_.emplace(*data_);
   for (std::size_t r = 0; r + 1 < data_->run_begin.size(); ++r)

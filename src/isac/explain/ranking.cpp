@@ -39,6 +39,11 @@ bool Ranking::is_limit_case(const Trial& t) const {
   return false;
 }
 
+/// Nothing forbids it, and of two that the data cannot tell apart the other is told first: what was added to a joint is seldom less than nothing.
+bool Ranking::is_against_its_name(const Trial& t) const {
+  return id_of(t) == "inertia_error" && t.values[0] < 0;
+}
+
 void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const {
   if (trials.empty()) return;
   const auto least = std::min_element(trials.begin(), trials.end(),
@@ -60,8 +65,11 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
       const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
                            (trials[i].behind.t < kNestedLimit || twins ||
                             (trials[i].behind.t < kLimitReach && is_limit_case(trials[0])));
-      const bool fewer = twins && parameters_of(trials[i]) < parameters_of(trials[0]);
-      if (!simpler && !fewer) continue;
+      const int more = parameters_of(trials[i]) - parameters_of(trials[0]);
+      const bool likelier =
+          twins &&
+          (more < 0 || (more == 0 && is_against_its_name(trials[0]) && !is_against_its_name(trials[i])));
+      if (!simpler && !likelier) continue;
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       mark(trials);

@@ -41,6 +41,7 @@ class Ranking {
   [[nodiscard]] std::string id_of(const Trial& trial) const;
   /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none.
   [[nodiscard]] bool is_limit_case(const Trial& trial) const;
+  [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.
   void rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const;

@@ -58,9 +58,9 @@ class Search {
     say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
     place_slip(library_, data_, found_.baseline.residual);
     move_to(found_.baseline);
-    take_colour();
-    forward();
-    if (found_.worth_another_look) return std::move(found_);
+    take_colour(place_.residual);
+    if (!found_.wants_torque_of_free_runs) forward();
+    if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
     if (found_.added.size() > 1) swap_and_drop();
     if (found_.adequate && !found_.added.empty()) hold_against_functions();
     look_at_remainder();
@@ -128,21 +128,34 @@ class Search {
     place_ = around(predictor_, found_.model, found_.weights);
   }
 
-  /// Everything is fitted anew beside the noise's slow part.
-  void take_colour() {
-    const Eigen::VectorXd left = beside_generic_functions(data_, place_.residual);
+  /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
+  void take_colour(const Eigen::VectorXd& left_over) {
+    const Eigen::VectorXd left = beside_generic_functions(data_, left_over);
     for (int c = 0; c < kChains; ++c)
       if (data_.has(static_cast<Chain>(c)))
         found_.weights.colour[c] = colour_of(data_, left, static_cast<Chain>(c));
-    // The same force sensors speak in both.
-    const double ratio = found_.weights.sigma[0] / found_.weights.sigma[3];
-    if (data_.has(Chain::kTorque) && data_.has(Chain::kMotion))
-      found_.weights.colour[3].wander =
-          std::max(found_.weights.colour[3].wander, ratio * ratio * found_.weights.colour[0].wander);
+    share_zero(left);
     found_.weights.take(data_);
     responses_.forget();
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(found_.baseline);
+  }
+
+  /// The same force sensors read the torque and what the motion is held against.
+  void share_zero(const Eigen::VectorXd& left) {
+    constexpr int kTorque = static_cast<int>(Chain::kTorque), kMotion = static_cast<int>(Chain::kMotion);
+    Weights& weights = found_.weights;
+    weights.one_zero = false;
+    if (!(weights.colour[kTorque].wander > 0) || !data_.has(Chain::kMotion)) return;
+    found_.wants_torque_of_free_runs = can_add_torque_of_free_runs(data_);
+    const double ratio = weights.sigma[kTorque] / weights.sigma[kMotion];
+    weights.one_zero = data_.with_free_torque;
+    if (weights.one_zero) {
+      weights.colour[kMotion] = colour_of(data_, without_shared_zero(data_, weights, left), Chain::kMotion);
+    } else {
+      weights.colour[kMotion].wander =
+          std::max(weights.colour[kMotion].wander, ratio * ratio * weights.colour[kTorque].wander);
+    }
   }
 
   /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.
@@ -166,7 +179,14 @@ class Search {
     const std::vector<Trial> best = refit_all({first});
     choose_blocks(best.front().residual);
     if (data_.block_seconds > before) cut_blocks(data_, before);
-    if (!is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit) {
+    const bool large_and_not_found = !is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit;
+    if (large_and_not_found && found_.added.empty() && !colour_beside_best_) {
+      // Too little is left of it in the other blocks, or the noise was taken for as slow as the effect is.
+      colour_beside_best_ = true;
+      take_colour(unfiltered(data_, found_.weights, best.front().residual));
+      return found_.wants_torque_of_free_runs ? s : screen_here();
+    }
+    if (large_and_not_found) {
       judge(s, data_, library_, screen_options(),
             yardstick_beside(s, data_, responses_, first.hypothesis, best.front().residual));
     } else if (data_.block_seconds < before) {
@@ -320,6 +340,7 @@ class Search {
       if (narrow) asked_for_ = look_.contenders;
       Step step = step_here();
       asked_for_.reset();
+      if (found_.wants_torque_of_free_runs) return;
       if (narrow && !is_open(step)) step = step_here();
       if (found_.steps.empty()) found_.gate = step.gate;
       const bool open = is_open(step);
@@ -333,6 +354,7 @@ class Search {
       report(step.trials);
       found_.adequate = !open;
       if (open && found_.added.empty() && is_convention(step)) continue;
+      if (open && is_within_a_step(step) && leave_half_a_step()) continue;
       if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
       bool take =
           open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
@@ -461,10 +483,19 @@ class Search {
     say(found_.doubts.back());
   }
 
+  /// Beside an effect, an offset of less than half a step is how the encoder is read.
+  bool is_within_a_step(const Step& step) const {
+    return !found_.added.empty() && std::any_of(step.trials.begin(), step.trials.end(), [&](const Trial& t) {
+      return t.in_set && ranking_.id_of(t) == "encoder_offset" &&
+             std::abs(t.values[0]) < 0.5 * data_.rig.angle_step;
+    });
+  }
+
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
   /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.)
-  void leave_half_a_step() {
-    if (found_.added.empty() || !std::isfinite(data_.rig.angle_step) || !data_.baseline.terms.empty()) return;
+  bool leave_half_a_step() {
+    if (found_.added.empty() || !std::isfinite(data_.rig.angle_step) || !data_.baseline.terms.empty())
+      return false;
     std::vector<Active> effects(
         found_.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found_.model.tolerances),
         found_.model.model.effects.end());
@@ -472,10 +503,14 @@ class Search {
       const std::string id = a.hypothesis->id();
       return id == "encoder_offset" || id == "torque_offset";
     });
-    if (an_offset || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return;
+    const bool there =
+        std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
+                    [](const Hypothesis& h) { return h.id() == "encoder_offset" && h.upper[0] > 0; });
+    if (an_offset || there || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return false;
     tolerate(library_, data_, "encoder_offset", -0.5 * data_.rig.angle_step, 0.5 * data_.rig.angle_step);
     const Fit base = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(refit(predictor_, base, effects, found_.weights, 8));
+    return true;
   }
 
   /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
@@ -582,7 +617,8 @@ class Search {
   Around place_;                                    ///< of found_.model
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   Responses responses_;
-  double first_size_ = 0;  ///< of the first effect, over the floor
+  double first_size_ = 0;            ///< of the first effect, over the floor
+  bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
 
 }  // namespace

@@ -37,6 +37,8 @@ struct Found {
   std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
   bool worth_another_look = false;
+  /// Ended at its beginning: the force sensors' zero wanders, so the torque of free runs is wanted beside their motion (prepared.hpp).
+  bool wants_torque_of_free_runs = false;
   std::set<std::string> contenders;  ///< then: ids of what stood near the top of any screen
   std::vector<TrialNote> notes;
 };

@@ -34,9 +34,13 @@ struct NoiseFilter {
   const Prepared* data = nullptr;
   std::size_t rows = 0;
   std::vector<Gains> gains;
+  /// Of rows of the motion, where torque and motion have one zero: the row of the torque that last told it, −1 where none did.
+  std::vector<std::ptrdiff_t> told_by;
+  double share = 0;  ///< σ_torque/σ_motion
 
-  NoiseFilter(const Prepared& of, const Colour (&colours)[kChains])
-      : data(&of), rows(of.rows.size()), gains(rows) {
+  NoiseFilter(const Prepared& of, const Weights& weights) : data(&of), rows(of.rows.size()), gains(rows) {
+    const Colour(&colours)[kChains] = weights.colour;
+    if (weights.one_zero) find_partners(weights);
     const Row* last = nullptr;
     double p11 = 0, p12 = 0, p22 = 0;
     double stay1 = 0, stay2 = 0;
@@ -71,11 +75,35 @@ struct NoiseFilter {
       last = &row;
     }
   }
+
+  void find_partners(const Weights& weights) {
+    constexpr double kStillTold = 1.0;  // s
+    share = weights.sigma[static_cast<int>(Chain::kTorque)] / weights.sigma[static_cast<int>(Chain::kMotion)];
+    told_by.assign(rows, -1);
+    std::size_t torque = 0;  // rows of a run's torque come before those of its motion, both by time
+    for (std::size_t i = 0; i < rows; ++i) {
+      const Row& row = data->rows[i];
+      if (row.chain != Chain::kMotion) continue;
+      if (i == 0 || data->rows[i - 1].chain != Chain::kMotion) torque = data->run_begin[row.run];
+      const auto tells = [&](std::size_t k) {
+        return data->rows[k].chain == Chain::kTorque && data->rows[k].sample <= row.sample;
+      };
+      if (!tells(torque)) continue;
+      while (tells(torque + 1)) ++torque;
+      if ((row.sample - data->rows[torque].sample) * data->runs[row.run].interval <= kStillTold)
+        told_by[i] = static_cast<std::ptrdiff_t>(torque);
+    }
+  }
+
+  /// The zero that a row of the motion shares, in its σ, from the zeros along the rows before.
+  [[nodiscard]] double shared(std::size_t i, const std::vector<double>& zero) const {
+    return told_by.empty() || told_by[i] < 0 ? 0.0 : share * zero[static_cast<std::size_t>(told_by[i])];
+  }
 };
 
 void Weights::take(const Prepared& data) {
   filter = std::any_of(std::begin(colour), std::end(colour), is_slow)
-               ? std::make_shared<const NoiseFilter>(data, colour)
+               ? std::make_shared<const NoiseFilter>(data, *this)
                : nullptr;
 }
 
@@ -85,7 +113,7 @@ std::shared_ptr<const NoiseFilter> filter_of(const Prepared& data, const Weights
   if (weights.filter && weights.filter->data == &data && weights.filter->rows == data.rows.size())
     return weights.filter;
   return std::any_of(std::begin(weights.colour), std::end(weights.colour), is_slow)
-             ? std::make_shared<const NoiseFilter>(data, weights.colour)
+             ? std::make_shared<const NoiseFilter>(data, weights)
              : nullptr;
 }
 
@@ -94,6 +122,7 @@ std::shared_ptr<const NoiseFilter> filter_of(const Prepared& data, const Weights
 void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::VectorXd> rows) {
   const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
   double m1 = 0, m2 = 0;
+  std::vector<double> zero(filter && weights.one_zero ? data.rows.size() : 0);
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     double& y = rows[static_cast<Eigen::Index>(i)];
     y /= weights.sigma[static_cast<int>(data.rows[i].chain)];
@@ -101,9 +130,10 @@ void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::Vecto
     const NoiseFilter::Gains& g = filter->gains[i];
     m1 *= g.stay1;
     m2 *= g.stay2;
-    const double innovation = y - m1 - m2;
+    const double innovation = y - filter->shared(i, zero) - m1 - m2;
     m1 += g.gain1 * innovation;
     m2 += g.gain2 * innovation;
+    if (!zero.empty()) zero[i] = m2;
     y = g.scale * innovation;
   }
 }
@@ -113,16 +143,33 @@ Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights, const E
   if (!filter) return weighted;
   Eigen::VectorXd rows = weighted;
   double m1 = 0, m2 = 0;
+  std::vector<double> zero(weights.one_zero ? data.rows.size() : 0);
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     double& e = rows[static_cast<Eigen::Index>(i)];
     const NoiseFilter::Gains& g = filter->gains[i];
     m1 *= g.stay1;
     m2 *= g.stay2;
-    const double innovation = e / g.scale, before = m1 + m2;
+    const double innovation = e / g.scale, before = filter->shared(i, zero) + m1 + m2;
     m1 += g.gain1 * innovation;
     m2 += g.gain2 * innovation;
+    if (!zero.empty()) zero[i] = m2;
     e = before + innovation;
   }
+  return rows;
+}
+
+Eigen::VectorXd without_shared_zero(const Prepared& data, const Weights& weights, Eigen::VectorXd rows) {
+  Weights only;  // of the motion's rows nothing but the zero is taken off
+  std::copy(std::begin(weights.sigma), std::end(weights.sigma), std::begin(only.sigma));
+  only.colour[static_cast<int>(Chain::kTorque)] = weights.colour[static_cast<int>(Chain::kTorque)];
+  only.one_zero = true;
+  Eigen::VectorXd weighed = rows;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    weighed[static_cast<Eigen::Index>(i)] *= weights.sigma[static_cast<int>(data.rows[i].chain)];
+  weigh(data, only, weighed);
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (data.rows[i].chain == Chain::kMotion)
+      rows[static_cast<Eigen::Index>(i)] = weighed[static_cast<Eigen::Index>(i)];
   return rows;
 }
 
@@ -186,7 +233,11 @@ double wander_of(const std::vector<std::vector<double>>& pieces, std::size_t row
 }  // namespace
 
 Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain) {
-  // Pieces without gaps.
+  // Pieces without gaps. (A free run's torque has one wherever the joint rests; driven runs show the same sensors.)
+  const auto belongs = [&](const Row& row) {
+    return row.chain == chain &&
+           !(chain == Chain::kTorque && data.with_free_torque && data.runs[row.run].is_free);
+  };
   std::vector<std::vector<double>> pieces;
   double spacing = 0;
   unsigned step = 0;  // the shortest: a chain may begin with a gap
@@ -195,7 +246,7 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
     return last != nullptr && last->run == row.run && row.sample > last->sample;
   };
   for (const Row& row : data.rows) {
-    if (row.chain != chain) continue;
+    if (!belongs(row)) continue;
     if (follows(row) && (step == 0 || row.sample - last->sample < step)) {
       step = row.sample - last->sample;
       spacing = step * data.runs[row.run].interval;
@@ -205,7 +256,7 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   last = nullptr;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const Row& row = data.rows[i];
-    if (row.chain != chain) continue;
+    if (!belongs(row)) continue;
     if (!follows(row) || row.sample - last->sample != step) pieces.emplace_back();
     pieces.back().push_back(residual[static_cast<Eigen::Index>(i)]);
     last = &row;

@@ -5,6 +5,10 @@
 ///   d a zero that wanders: variance s_d, memory 100 s
 ///   v_k = y_k − m_k,  e_k = v_k √(w/(P_k + w)),  m the filter's prediction of z + d, P its variance
 ///
+/// A free joint's torque is read by the same force sensors that its motion is held against: where their zero wanders, what the filter makes
+/// of it along the torque's rows is taken off the motion's (`one_zero`), y_motion,k − d̂_k σ_torque/σ_motion, before those pass their own filter.
+/// What is left there is how the model's torque moves the joint, which no force sensor reads.
+///
 /// v are the innovations of the Kalman filter of y; e is without memory and has n's spectral density at low frequencies, if the noise is as
 /// assumed. Residuals, sensitivities and responses pass the same filter, so least squares in e is generalised least squares in y: a jump of torque counts for what it is
 /// beside noise that cannot jump. Where the noise is assumed wrongly, fits lose efficiency, never their mean; the tests flip blocks and
@@ -32,6 +36,7 @@ struct NoiseFilter;
 struct Weights {
   double sigma[kChains] = {1, 1, 1, 1};  ///< of one low-passed row, N m or Pa
   Colour colour[kChains];
+  bool one_zero = false;  ///< of torque and motion: they are read by the same sensors
   std::shared_ptr<const NoiseFilter>
       filter;  ///< of these colours and the data that take() saw; any other is made when it is needed
 
@@ -40,6 +45,9 @@ struct Weights {
 
 /// Rows in the chains' units → weighted rows e.
 void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::VectorXd> rows);
+/// Rows r/σ of which those of the motion have lost the zero that the torque's rows tell of.
+[[nodiscard]] Eigen::VectorXd without_shared_zero(const Prepared& data, const Weights& weights,
+                                                  Eigen::VectorXd rows);
 /// Weighted rows e → r/σ, as they are in time.
 [[nodiscard]] Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights,
                                          const Eigen::VectorXd& weighted);

@@ -1,0 +1,69 @@
+// Effects as slow or as rare as a zero of the force sensors that wanders by as much.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "isac/explain/explain.hpp"
+#include "tied_data.hpp"
+
+namespace isac::explain {
+namespace {
+
+PlannedRun free_run(double period, double swing) {
+  return {.experiment = "free",
+          .seconds = 20,
+          .mean_pressure_kgcm2 = 3,
+          .pressure_swing_kgcm2 = swing,
+          .pressure_period_s = period,
+          .waveform = "steps"};
+}
+
+std::vector<PlannedRun> day() {
+  return {test::by_hand(30, 0.5, 2.5), test::by_hand(30, 0.4, 1.2), free_run(1.7, 0.6),
+          test::by_hand(30, 0.3, 0.6), free_run(2.9, 0.4),          test::clamped(30, 0.1, 1.2, 6)};
+}
+
+Explanation explained(const test::TiedRig& rig, std::uint32_t first) {
+  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), free_run(2.1, 0.5)};
+  return explain(test::record_all(rig, day(), first), HeldOut(test::record_all(rig, beyond, first + 20)),
+                 {.rig = rig.facts(), .traces = false, .next_experiment = false});
+}
+
+bool names(const Explanation& e, const std::string& id) {
+  const auto is = [&](const Candidate& c) { return c.id == id; };
+  return std::any_of(e.effects.begin(), e.effects.end(), is) ||
+         std::any_of(e.alternatives.begin(), e.alternatives.end(), is);
+}
+
+TEST(WanderingZero, hides_no_constant_torque_where_a_free_joint_moves_by_it) {
+  const test::TiedRig rig{.offset = 0.008, .zero_wander = 0.008};
+  int found = 0;
+  for (std::uint32_t first = 100; first < 400; first += 100) {
+    const Explanation e = explained(rig, first);
+    found += names(e, "torque_offset") && names(e, "encoder_offset") ? 1 : 0;
+    EXPECT_TRUE(e.verdict != Verdict::kNamed || e.effects.front().id == "torque_offset") << e.summary;
+  }
+  EXPECT_GE(found, 2);  // short runs do not show every day that it wanders
+}
+
+TEST(WanderingZero, alone_is_no_constant_torque) {
+  const test::TiedRig rig{.zero_wander = 0.008};
+  for (std::uint32_t first = 100; first < 300; first += 100) {
+    const Explanation e = explained(rig, first);
+    EXPECT_TRUE(e.effects.empty() || !e.doubts.empty()) << e.summary;
+  }
+}
+
+TEST(WanderingZero, is_not_taken_for_a_reading_that_is_clipped_in_one_run) {
+  const test::TiedRig rig{.force_most = 145, .zero_wander = 0.004};
+  const Explanation e = explained(rig, 600);
+  ASSERT_EQ(e.effects.size(), 1U) << e.summary;
+  EXPECT_EQ(e.effects.front().id, "force_saturation") << e.summary;
+  EXPECT_NEAR(e.effects.front().parameters.front().value, rig.force_most, 0.5);
+}
+
+}  // namespace
+}  // namespace isac::explain
