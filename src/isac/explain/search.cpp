@@ -130,32 +130,12 @@ class Search {
 
   /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
   void take_colour(const Eigen::VectorXd& left_over) {
-    const Eigen::VectorXd left = beside_generic_functions(data_, left_over);
-    for (int c = 0; c < kChains; ++c)
-      if (data_.has(static_cast<Chain>(c)))
-        found_.weights.colour[c] = colour_of(data_, left, static_cast<Chain>(c));
-    share_zero(left);
-    found_.weights.take(data_);
+    take_colours(data_, beside_generic_functions(data_, left_over), found_.weights);
+    found_.wants_torque_of_free_runs = found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0 &&
+                                       can_add_torque_of_free_runs(data_);
     responses_.forget();
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(found_.baseline);
-  }
-
-  /// The same force sensors read the torque and what the motion is held against.
-  void share_zero(const Eigen::VectorXd& left) {
-    constexpr int kTorque = static_cast<int>(Chain::kTorque), kMotion = static_cast<int>(Chain::kMotion);
-    Weights& weights = found_.weights;
-    weights.one_zero = false;
-    if (!(weights.colour[kTorque].wander > 0) || !data_.has(Chain::kMotion)) return;
-    found_.wants_torque_of_free_runs = can_add_torque_of_free_runs(data_);
-    const double ratio = weights.sigma[kTorque] / weights.sigma[kMotion];
-    weights.one_zero = data_.with_free_torque;
-    if (weights.one_zero) {
-      weights.colour[kMotion] = colour_of(data_, without_shared_zero(data_, weights, left), Chain::kMotion);
-    } else {
-      weights.colour[kMotion].wander =
-          std::max(weights.colour[kMotion].wander, ratio * ratio * weights.colour[kTorque].wander);
-    }
   }
 
   /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.

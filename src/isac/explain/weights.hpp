@@ -56,4 +56,7 @@ void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::Vecto
 /// reach, the white part from what is left within it.
 [[nodiscard]] Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain);
 
+/// Colours of all chains from a residual r/σ, and whether torque and motion have one zero: `weights` with them, ready (take() is called).
+void take_colours(const Prepared& data, const Eigen::VectorXd& residual, Weights& weights);
+
 }  // namespace isac::explain
