@@ -101,6 +101,7 @@ TEST(NextExperiment, settles_ties_in_noisy_recordings_made_without_the_model) {
   TiedRig uneven, more_uneven;
   uneven.asymmetry = 0.02;
   more_uneven.asymmetry = 0.05;
+  uneven.pretension = more_uneven.pretension = 80;
   const Hidden hidden[] = {{"muscle_asymmetry", uneven, test::constant_mean_pressure()},
                            {"muscle_asymmetry", more_uneven, test::constant_mean_pressure()}};
   int tied = 0, settled = 0;

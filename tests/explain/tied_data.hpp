@@ -21,7 +21,8 @@ namespace isac::test {
 struct TiedRig {
   double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
   double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 120;  // N at p0: both muscles stay taut
-  double dry = 0, load_exponent = 0;                                    // N m, and its power of p_mean/p0
+  double pretension = 0;  // N at no pressure; without it a force's gain says what an asymmetry says
+  double dry = 0, load_exponent = 0;       // N m, and its power of p_mean/p0
   double offset = 0, asymmetry = 0;        // N m at p0 whatever the pressure, and in proportion to it
   double dead_time = 0, second_lag = 0;    // s
   double encoder_play = 0;                 // rad, half of it, between joint and encoder
@@ -129,7 +130,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       }
     }
     shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
-    const double carried = torque(velocity), both_pull = rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
+    const double carried = torque(velocity),
+                 both_pull = rig.pretension + rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
     for (int i = 0; i < 2; ++i) {
       const double now = both_pull + (i == 0 ? -0.5 : 0.5) * carried / rig.radius;
       force[i] += k == 0 || !(rig.force_lag > 0) ? now - force[i]
