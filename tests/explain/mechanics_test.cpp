@@ -6,6 +6,8 @@
 #include <string>
 
 #include "experiment_bench.hpp"
+#include "isac/explain/generic_fit.hpp"
+#include "isac/explain/ranking.hpp"
 
 namespace isac::explain {
 namespace {
@@ -102,6 +104,33 @@ TEST(Threshold, that_only_one_run_falls_below_comes_back) {
   lower.seconds = 4;
   const Bench bench(rig, {by_hand(30, 0.35, 1.0), low, lower});
   EXPECT_NEAR(fitted(bench, "threshold_pressure").values[0], rig.threshold, 0.02 * rig.threshold);
+}
+
+// Angles pass the kernel after a slip was taken off and before a gain is; beside a gain both ways must end alike.
+TEST(Slip, of_nothing_changes_nothing_beside_a_gain_of_the_encoder) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), by_hand(20, 0.3, 3.0)});
+  ModelPoint model = bench.stem.model;
+  model.effects.push_back({bench.find("encoder_gain"), {0.09}});
+  Eigen::VectorXd with_gain = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bench.predictor.rows())),
+                  with_both = with_gain;
+  bench.predictor.predict(model, kAllChains, with_gain);
+  model.effects.push_back({bench.find("encoder_slip"), {1e-7, 60}});
+  bench.predictor.predict(model, kAllChains, with_both);
+  for (std::size_t i = 0; i < bench.data.rows.size(); ++i) {
+    if (bench.data.rows[i].chain != Chain::kTorque) continue;
+    ASSERT_NEAR(with_both[static_cast<Eigen::Index>(i)], with_gain[static_cast<Eigen::Index>(i)], 5e-5) << i;
+  }
+}
+
+TEST(Slip, within_a_run_is_the_best_of_many_moments) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), by_hand(20, 0.3, 3.0)});
+  const Ranking ranking(bench.data, bench.library);
+  Trial trial;
+  trial.hypothesis = static_cast<int>(bench.find("encoder_slip") - bench.library.hypotheses.data());
+  trial.values = {1e-3, bench.data.runs[1].day_offset - 0.5};
+  const int between = ranking.parameters_of(trial);
+  trial.values[1] = bench.data.runs[1].day_offset + 10;
+  EXPECT_EQ(ranking.parameters_of(trial), between + kChoosingOne);
 }
 
 }  // namespace

@@ -131,25 +131,26 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
         truth[k] = read[k] - (y.angle - truth[k]);
       }
   }
+  // φ_true = φ − δ with δ linear in φ and in t: the slopes of δ from two angles and two times.
+  double by_angle = 0, by_time = 0;
+  for (const Active* a : readings) {
+    if (!a->hypothesis->info().linear) continue;
+    const auto delta = [&](double angle, double time) {
+      models::Readings<double> y;
+      y.angle = angle;
+      models::effect_reading(a->hypothesis->effect, a->values.data(), time,
+                             static_cast<const double*>(nullptr), y);
+      return y.angle - angle;
+    };
+    by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
+    if (!rests) by_time += delta(0, 1) - delta(0, 0);
+  }
+  const double ratio = 1 / (1 + by_angle);
   const bool slow = !run.slow_acceleration.empty();
   if (smooth) {
     in.own_velocity = run.velocity;
     in.own_acceleration = run.acceleration;
     if (slow) in.own_slow_acceleration = run.slow_acceleration;
-    // φ_true = φ − δ with δ linear in φ and in t: the slopes of δ from two angles and two times.
-    double by_angle = 0, by_time = 0;
-    for (const Active* a : readings) {
-      const auto delta = [&](double angle, double time) {
-        models::Readings<double> y;
-        y.angle = angle;
-        models::effect_reading(a->hypothesis->effect, a->values.data(), time,
-                               static_cast<const double*>(nullptr), y);
-        return y.angle - angle;
-      };
-      by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
-      if (!rests) by_time += delta(0, 1) - delta(0, 0);
-    }
-    const double ratio = 1 / (1 + by_angle);
     for (std::size_t k = 0; k < n; ++k) {
       in.own_velocity[k] = (run.velocity[k] - by_time) * ratio;
       in.own_acceleration[k] = run.acceleration[k] * ratio;
@@ -159,7 +160,7 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
   } else {
     const double sigma = data_->smoothing.torque / dt;
     in.own_angle = low_pass(truth, sigma);
-    in.own_velocity = quiet_velocity(truth, sigma, dt, data_->rig.angle_step);
+    in.own_velocity = quiet_velocity(truth, sigma, dt, data_->rig.angle_step * ratio);
     in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
     if (slow) in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
   }
