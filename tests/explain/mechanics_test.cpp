@@ -47,30 +47,13 @@ TEST(EncoderPlay, of_little_more_than_a_step_comes_back) {
 TEST(Compliance, within_the_known_inertia_comes_back_although_nobody_saw_its_far_side_begin) {
   TiedRig rig;
   rig.far_inertia = 0.0035;
-  const auto free = [](double period, double swing) {
-    return PlannedRun{.experiment = "free",
-                      .seconds = 25,
-                      .mean_pressure_kgcm2 = 3,
-                      .pressure_swing_kgcm2 = swing,
-                      .pressure_period_s = period,
-                      .waveform = "steps"};
-  };
-  const Bench bench(
-      rig, {by_hand(30, 0.35, 1.0), free(1.7, 0.6), free(2.9, 0.4), test::clamped(24, 0.1, 0.5, 12)});
+  const Bench bench(rig, {by_hand(30, 0.35, 1.0), test::free_in_steps(25, 1.7, 0.6),
+                          test::free_in_steps(25, 2.9, 0.4), test::clamped(24, 0.1, 0.5, 12)});
   const Fitted within = fitted(bench, "series_elasticity_within");
   EXPECT_NEAR(within.values[0], rig.far_inertia, 0.15 * rig.far_inertia);
   EXPECT_NEAR(within.values[1], rig.far_hertz, 0.04 * rig.far_hertz);
   EXPECT_GT(within.gain, 1.05 * fitted(bench, "series_elasticity").gain);
   EXPECT_GT(within.gain, 1.2 * fitted(bench, "inertia_error").gain);
-}
-
-PlannedRun free_run(double period, double swing) {
-  return {.experiment = "free",
-          .seconds = 20,
-          .mean_pressure_kgcm2 = 3,
-          .pressure_swing_kgcm2 = swing,
-          .pressure_period_s = period,
-          .waveform = "steps"};
 }
 
 TEST(ForceLag, of_a_third_of_a_sample_comes_back) {
@@ -87,7 +70,7 @@ TEST(ForceGain, gains_nothing_by_smoothing_the_noise_of_a_torque_that_is_smooth_
   TiedRig rig;
   rig.known_inertia = 0.93 * rig.inertia;
   const Bench bench(rig, {by_hand(30, 0.35, 3.0), by_hand(30, 0.3, 1.0), test::clamped(30, 0.1, 1.2, 3),
-                          free_run(1.7, 0.6), free_run(2.9, 0.4)});
+                          test::free_in_steps(20, 1.7, 0.6), test::free_in_steps(20, 2.9, 0.4)});
   const double inertia = fitted(bench, "inertia_error").gain, forces = fitted(bench, "force_gain_error").gain;
   EXPECT_GT(inertia, 1000);
   EXPECT_NEAR(forces, inertia, 12) << "two gains are one inertia, and a parameter more";

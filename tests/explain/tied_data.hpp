@@ -206,6 +206,15 @@ inline explain::PlannedRun clamped(double seconds, double angle, double swing, d
           .waveform = waveform};
 }
 
+inline explain::PlannedRun free_in_steps(double seconds, double period, double swing) {
+  return {.experiment = "free",
+          .seconds = seconds,
+          .mean_pressure_kgcm2 = 3,
+          .pressure_swing_kgcm2 = swing,
+          .pressure_period_s = period,
+          .waveform = "steps"};
+}
+
 inline std::vector<series::Recording> record_all(const TiedRig& rig,
                                                  const std::vector<explain::PlannedRun>& runs,
                                                  std::uint32_t first = 1) {

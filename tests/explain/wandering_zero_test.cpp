@@ -12,22 +12,13 @@
 namespace isac::explain {
 namespace {
 
-PlannedRun free_run(double period, double swing) {
-  return {.experiment = "free",
-          .seconds = 20,
-          .mean_pressure_kgcm2 = 3,
-          .pressure_swing_kgcm2 = swing,
-          .pressure_period_s = period,
-          .waveform = "steps"};
-}
-
 std::vector<PlannedRun> day() {
-  return {test::by_hand(30, 0.5, 2.5), test::by_hand(30, 0.4, 1.2), free_run(1.7, 0.6),
-          test::by_hand(30, 0.3, 0.6), free_run(2.9, 0.4),          test::clamped(30, 0.1, 1.2, 6)};
+  return {test::by_hand(30, 0.5, 2.5), test::by_hand(30, 0.4, 1.2),       test::free_in_steps(20, 1.7, 0.6),
+          test::by_hand(30, 0.3, 0.6), test::free_in_steps(20, 2.9, 0.4), test::clamped(30, 0.1, 1.2, 6)};
 }
 
 Explanation explained(const test::TiedRig& rig, std::uint32_t first) {
-  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), free_run(2.1, 0.5)};
+  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), test::free_in_steps(20, 2.1, 0.5)};
   return explain(test::record_all(rig, day(), first), HeldOut(test::record_all(rig, beyond, first + 20)),
                  {.rig = rig.facts(), .traces = false, .next_experiment = false});
 }
