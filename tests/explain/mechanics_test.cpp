@@ -116,5 +116,51 @@ TEST(Slip, within_a_run_is_the_best_of_many_moments) {
   EXPECT_EQ(ranking.parameters_of(trial), between + kChoosingOne);
 }
 
+// Two that leave the same residual: of an inertia and an encoder's gain that one is told first which is what its name says.
+TEST(Twins, are_told_in_the_order_of_what_their_names_say) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::free_in_steps(20, 1.7, 0.6)});
+  const Ranking ranking(bench.data, bench.library);
+  const auto place = [&](const char* id) {
+    return static_cast<int>(bench.find(id) - bench.library.hypotheses.data());
+  };
+  const auto first = [&](double inertia) {
+    std::vector<Trial> trials(2);
+    trials[0].hypothesis = place("inertia_error");
+    trials[0].values = {inertia};
+    trials[1].hypothesis = place("encoder_gain");
+    trials[1].values = {-inertia / bench.data.rig.inertia};
+    for (Trial& t : trials) {
+      t.residual = 0.5 * bench.stem.residual;
+      t.loss = t.residual.squaredNorm();
+    }
+    ranking.rank(trials, bench.stem.residual);
+    EXPECT_TRUE(trials[0].in_set && trials[1].in_set);
+    return ranking.id_of(trials.front());
+  };
+  EXPECT_EQ(first(5e-4), "inertia_error");
+  EXPECT_EQ(first(-5e-4), "encoder_gain");
+}
+
+TEST(Screen, lets_any_shape_of_an_effect_speak_for_it) {
+  TiedRig rig;
+  rig.dry = 0.02;
+  const Bench bench(rig, {by_hand(20, 0.35, 1.0), by_hand(20, 0.3, 0.4), by_hand(20, 0.3, 3.0)});
+  const Screen s = screen(around(bench.predictor, bench.stem, bench.weights), bench.library, {.flips = 199});
+  int not_of_most_gain = 0;
+  for (const Screened& c : s.candidates) {
+    double T = 0, rare_p = 1, of_most_gain = 0;
+    for (const Screened& shape : s.shapes)
+      if (shape.hypothesis == c.hypothesis) {
+        T = std::max(T, shape.T);
+        rare_p = std::min(rare_p, shape.rare_p);
+        if (shape.shape == c.shape) of_most_gain = shape.T;
+      }
+    EXPECT_EQ(c.T, T) << c.hypothesis;
+    EXPECT_EQ(c.rare_p, rare_p) << c.hypothesis;
+    not_of_most_gain += of_most_gain < T ? 1 : 0;
+  }
+  EXPECT_GT(not_of_most_gain, 0);
+}
+
 }  // namespace
 }  // namespace isac::explain

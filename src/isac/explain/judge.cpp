@@ -130,6 +130,7 @@ class Elsewhere {
 FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double significance,
                    std::optional<double> statistic) {
   const Eigen::Index blocks = scores.rows(), columns = scores.cols();
+  if (columns == 0) return {};  // nothing was looked for
   Eigen::MatrixXd scaled = scores;
   for (Eigen::Index j = 0; j < columns; ++j) {
     const double norm = scaled.col(j).norm();
