@@ -67,6 +67,15 @@ Signals simulate(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
   return out;
 }
 
+/// Before it is let go, a hand holds the joint where it should start, or as far against its stop as a hand's torque goes. (Thrown off a
+/// stiff one from far beyond, it would have left within a sample or two, and no record would show why.)
+static double held_against_stop(const Hidden& hidden, double angle) {
+  constexpr double kHand = 20.0;  // N m
+  if (hidden.stop_stiffness == 0) return angle;
+  const double far = hidden.stop_angle + kHand / hidden.stop_stiffness;
+  return std::clamp(angle, hidden.stop_side <= 0 ? -far : -10.0, hidden.stop_side >= 0 ? far : 10.0);
+}
+
 Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, double step) {
   const int rows = run.rows(), per_row = std::max(1, static_cast<int>(std::lround(kRowTime / step)));
   Signals out;
@@ -74,7 +83,7 @@ Signals move_rig(const Rig& rig, const RunPlan& run, const Hidden& hidden, doubl
     column->resize(static_cast<std::size_t>(rows));
 
   Valves valves(rig, hidden, run);
-  const double start = run.free ? run.release_angle : run.hand.front();
+  const double start = run.free ? held_against_stop(hidden, run.release_angle) : run.hand.front();
   Muscles muscles(rig, hidden, start);
   Joint joint(rig, hidden, muscles, start);
   const bool lagged = hidden.force_lag != 0;

@@ -89,6 +89,18 @@ TEST(Plant, holds_a_stuck_joint_by_the_friction_inside_the_muscles) {
   EXPECT_NEAR(s.F2.back() - s.F1.back(), 0.0, 1e-9) << "what the muscles give to the joint is nothing";
 }
 
+TEST(Plant, lets_a_joint_go_no_further_beyond_its_stop_than_a_hand_holds_it) {
+  const Rig rig;
+  Hidden hidden;
+  hidden.stop_stiffness = 200.0;
+  hidden.stop_angle = 0.3;
+  hidden.stop_side = 1;
+  EXPECT_NEAR(simulate(rig, let_go(0.7, 0.5), hidden, 1e-4).angle.front(), 0.4, 2e-3);  // 20 N m
+  EXPECT_NEAR(simulate(rig, let_go(-0.7, 0.5), hidden, 1e-4).angle.front(), -0.7,
+              2e-3);  // no stop on that side
+  EXPECT_NEAR(simulate(rig, let_go(0.7, 0.5), Hidden{}, 1e-4).angle.front(), 0.7, 2e-3);
+}
+
 TEST(Plant, does_not_depend_on_its_step) {
   const Rig rig;
   Hidden hidden;

@@ -83,12 +83,11 @@ TEST(Judge, few_blocks_that_agree_are_significant_although_they_are_their_own_ya
 constexpr unsigned kRuns = 10;
 
 /// A response that rests within its runs, beside noise of its blocks and a zero of each run.
-Screen resting_screen(double effect, double zero, double resting, std::mt19937_64& random) {
+Screen resting_screen(double effect, double zero, bool resting, std::mt19937_64& random) {
   std::normal_distribution<double> normal;
   Screen screen;
   Column c;
   c.hypothesis = 0;
-  c.resting = resting;
   c.atom_norm = Eigen::VectorXd::Ones(kBlocks);
   c.atom_score = Eigen::VectorXd::Zero(kBlocks);
   for (Eigen::Index run = 0; run < kRuns; ++run) {
@@ -98,6 +97,7 @@ Screen resting_screen(double effect, double zero, double resting, std::mt19937_6
   }
   c.norm2 = c.chain_norm2[0] = kBlocks;
   c.score = c.atom_score.sum();
+  if (resting) c.atom_left = c.atom_score - c.score / c.norm2 * c.atom_norm;
   screen.columns.push_back(c);
   return screen;
 }
@@ -115,10 +115,10 @@ TEST(Judge, takes_no_zero_that_moves_between_runs_for_what_rests_within_them) {
   constexpr int kDraws = 2000;
   int by_runs = 0, by_blocks = 0;
   for (int i = 0; i < kDraws; ++i) {
-    for (const double resting : {1.0, 0.0}) {
+    for (const bool resting : {true, false}) {
       Screen screen = resting_screen(0, 1.0, resting, random);
       judge(screen, setting.data, setting.library, {.flips = 19});
-      (resting > 0 ? by_runs : by_blocks) += screen.columns[0].T > 1.96 ? 1 : 0;
+      (resting ? by_runs : by_blocks) += screen.columns[0].T > 1.96 ? 1 : 0;
     }
   }
   EXPECT_LE(by_runs, 0.065 * kDraws);  // three standard errors above 5 %
@@ -131,11 +131,70 @@ TEST(Judge, still_sees_what_rests_within_runs_where_the_runs_agree) {
   std::mt19937_64 random(8);
   int seen = 0;
   for (int i = 0; i < 200; ++i) {
-    Screen screen = resting_screen(1.0, 0.0, 1.0, random);
+    Screen screen = resting_screen(1.0, 0.0, true, random);
     judge(screen, setting.data, setting.library, {.flips = 19});
     seen += screen.columns[0].T > 4 ? 1 : 0;
   }
   EXPECT_GE(seen, 190);
+}
+
+TEST(Judge, scatter_of_runs_is_that_of_what_is_left_beside_the_column) {
+  // A drift of which a tolerance, held at its bound, took a constant: its scores grow from run to run, and so does what its own
+  // amplitude leaves of them. With the tolerance come back nothing but noise is left.
+  const Setting setting = setting_of_runs();
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  Screen screen = resting_screen(0, 0, true, random);
+  Column& c = screen.columns[0];
+  Eigen::VectorXd noise(static_cast<Eigen::Index>(kBlocks));
+  for (Eigen::Index b = 0; b < noise.size(); ++b) {
+    noise[b] = normal(random);
+    c.atom_score[b] = 2.0 + 4.0 * (static_cast<double>(b / (kBlocks / kRuns)) - 4.5) + noise[b];
+  }
+  c.score = c.atom_score.sum();
+  c.atom_left = c.atom_score - c.score / c.norm2 * c.atom_norm;
+  judge(screen, setting.data, setting.library, {.flips = 19});
+  EXPECT_LT(screen.columns[0].T, 1);
+  screen.columns[0].atom_left = noise.array() - noise.mean();
+  judge(screen, setting.data, setting.library, {.flips = 19});
+  EXPECT_GT(screen.columns[0].T, 2);  // what its blocks show
+}
+
+TEST(Around, leaves_beside_a_response_what_least_squares_within_the_tolerances_leave) {
+  std::mt19937_64 random(10);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](Eigen::Index cols) {
+    Eigen::MatrixXd m(60, cols);
+    for (double& v : m.reshaped()) v = normal(random);
+    return m;
+  };
+  int at_bound = 0;
+  for (int i = 0; i < 50; ++i) {
+    Around place;
+    place.held.slopes = draw(2);
+    place.held.low = Eigen::Vector2d(0, -0.4);
+    place.held.high = Eigen::Vector2d(0.4, 0);
+    place.held_gram = place.held.slopes.transpose() * place.held.slopes;
+    const Eigen::VectorXd x = draw(1);
+    place.residual = draw(1) + 3 * x - 0.3 * place.held.slopes.col(0) + 0.6 * place.held.slopes.col(1);
+    const double left = place.left_beside(x).squaredNorm();
+    // By hand: the amplitude is free, the two others lie on a grid within their bounds.
+    double least = 1e300;
+    Eigen::Vector2d best(0, 0);
+    for (double a = 0; a <= 0.4001; a += 0.01)
+      for (double b = -0.4; b <= 1e-9; b += 0.01) {
+        const Eigen::VectorXd r =
+            place.residual + a * place.held.slopes.col(0) + b * place.held.slopes.col(1);
+        const double loss = r.squaredNorm() - std::pow(x.dot(r), 2) / x.squaredNorm();
+        if (loss >= least) continue;
+        least = loss;
+        best = {a, b};
+      }
+    EXPECT_LE(left, least * (1 + 1e-9));
+    EXPECT_GE(left, least * (1 - 2e-3));  // half a step of the grid
+    at_bound += best[1] < -0.395 ? 1 : 0;
+  }
+  EXPECT_GE(at_bound, 40);
 }
 
 TEST(Judge, measures_a_large_rare_effect_by_what_its_refit_leaves_elsewhere) {

@@ -25,21 +25,20 @@ constexpr int kBlocksElsewhere = 20;
 // Of the level at which something counts as found; and of what lies beyond it, where a share that seldom speaks would only keep p-values
 // from being uniform.
 constexpr double kShareOfEach = 0.5, kRareBeyond = 0.02;
-constexpr double kResting = 0.5;  // of a column's squares are means of runs: it is as certain as they are
 
-/// Scatter of a score without its own part: √Σ (g_b − a n_b)²/(1 − h_b)², a = Σ g/Σ n, h_b = n_b/Σ n, and how many parts carry it.
+/// Scatter of a score without its own part: √Σ l_b²/(1 − h_b)², l_b = g_b − a n_b with a = Σ g/Σ n, h_b = n_b/Σ n, and how many parts carry it.
 struct Jackknife {
   double scatter = 0, carried_by = 0;
 };
 
-Jackknife jackknife(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
-  const double all = norm2.sum(), amplitude = score.sum() / all;
-  const Eigen::ArrayXd left = (score - amplitude * norm2).array() / (1 - (norm2.array() / all).min(0.99));
-  return {std::sqrt(left.square().sum()), all * all / norm2.squaredNorm()};
+Jackknife jackknife(const Eigen::VectorXd& left, const Eigen::VectorXd& norm2) {
+  const double all = norm2.sum();
+  return {std::sqrt((left.array() / (1 - (norm2.array() / all).min(0.99))).square().sum()),
+          all * all / norm2.squaredNorm()};
 }
 
 double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
-  const Jackknife of = jackknife(score, norm2);
+  const Jackknife of = jackknife(score - score.sum() / norm2.sum() * norm2, norm2);
   if (!(of.carried_by > 2)) return 1;  // no freedom is left
   return of.scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / of.scatter, of.carried_by - 1)
                         : 1.0;
@@ -47,22 +46,22 @@ double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
 
 /// p-value of a score of which whole runs scatter more than their blocks do:
 ///
-///   W = Σ_b (g_b − a n_b)²/(1 − h_b)²,  R the same of whole runs,  F = R/W > 1:
+///   W = Σ_b l_b²/(1 − h_b)²,  R the same of whole runs,  F = R/W > 1:
 ///   t = |Σ g|/√R with ν = F²/(1/ν_W + (F − 1)²/ν_R) degrees of freedom (Satterthwaite)
-std::optional<double> p_by_runs(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2,
+std::optional<double> p_by_runs(double score, const Eigen::VectorXd& left, const Eigen::VectorXd& norm2,
                                 const std::vector<Eigen::Index>& run_of_block, Eigen::Index runs) {
-  Eigen::VectorXd run_score = Eigen::VectorXd::Zero(runs), run_norm2 = Eigen::VectorXd::Zero(runs);
-  for (Eigen::Index b = 0; b < score.size(); ++b) {
-    run_score[run_of_block[static_cast<std::size_t>(b)]] += score[b];
+  Eigen::VectorXd run_left = Eigen::VectorXd::Zero(runs), run_norm2 = Eigen::VectorXd::Zero(runs);
+  for (Eigen::Index b = 0; b < left.size(); ++b) {
+    run_left[run_of_block[static_cast<std::size_t>(b)]] += left[b];
     run_norm2[run_of_block[static_cast<std::size_t>(b)]] += norm2[b];
   }
-  const Jackknife blocks = jackknife(score, norm2), whole = jackknife(run_score, run_norm2);
+  const Jackknife blocks = jackknife(left, norm2), whole = jackknife(run_left, run_norm2);
   if (!(whole.scatter > blocks.scatter) || !(blocks.scatter > 0)) return std::nullopt;
   const double F = whole.scatter * whole.scatter / (blocks.scatter * blocks.scatter);
   const double of_blocks = std::max(1.0, blocks.carried_by - 1),
                of_runs = std::max(1.0, whole.carried_by - 1);
   const double freedom = F * F / (1 / of_blocks + (F - 1) * (F - 1) / of_runs);
-  return series::student_t_two_sided(std::abs(score.sum()) / whole.scatter, freedom);
+  return series::student_t_two_sided(std::abs(score) / whole.scatter, freedom);
 }
 
 /// What scores of any function of the signals scatter, chain by chain, in blocks that a column does not live in.
@@ -199,8 +198,8 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
                              : bit(c.chain);
   };
   const auto told_by_runs = [&](const Column& c) -> std::optional<double> {
-    if (c.resting <= kResting) return std::nullopt;
-    return p_by_runs(joined(c.atom_score), joined(c.atom_norm), run_of_block,
+    if (c.atom_left.size() == 0) return std::nullopt;
+    return p_by_runs(c.score, joined(c.atom_left), joined(c.atom_norm), run_of_block,
                      static_cast<Eigen::Index>(data.runs.size()));
   };
   for (Column& c : result.columns) {

@@ -77,14 +77,29 @@ Around around(const Predictor& predictor, const Fit& fit, const Weights& weights
   return place;
 }
 
-Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
-  const Eigen::Index m = held.slopes.cols();
-  if (m == 0 || !left.allFinite()) return left;
-  Eigen::MatrixXd gram = held_gram;
+namespace {
+
+/// Adds what tolerances with these slopes, held at a bound, take of `left` when they come back.
+void come_back(const Held& held, const Eigen::MatrixXd& slopes, Eigen::MatrixXd gram, Eigen::VectorXd& left) {
   const double largest = std::max(gram.diagonal().maxCoeff(), 1e-300);
-  for (Eigen::Index i = 0; i < m; ++i) gram(i, i) += 1e-9 * gram(i, i) + 1e-12 * largest;
-  const Eigen::VectorXd d = bounded_quadratic(gram, held.slopes.transpose() * left, held.low, held.high);
-  left += held.slopes * d;
+  for (Eigen::Index i = 0; i < gram.rows(); ++i) gram(i, i) += 1e-9 * gram(i, i) + 1e-12 * largest;
+  left += slopes * bounded_quadratic(gram, slopes.transpose() * left, held.low, held.high);
+}
+
+}  // namespace
+
+Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
+  if (held.slopes.cols() > 0 && left.allFinite()) come_back(held, held.slopes, held_gram, left);
+  return left;
+}
+
+Eigen::VectorXd Around::left_beside(const Eigen::Ref<const Eigen::VectorXd>& x) const {
+  const double norm2 = x.squaredNorm();
+  if (!(norm2 > 0)) return release(residual);
+  Eigen::VectorXd left = residual - x * (x.dot(residual) / norm2);
+  if (held.slopes.cols() == 0 || !left.allFinite()) return left;
+  const Eigen::MatrixXd slopes = held.slopes - x * ((x.transpose() * held.slopes) / norm2);
+  come_back(held, slopes, slopes.transpose() * slopes, left);
   return left;
 }
 

@@ -37,6 +37,8 @@ struct Around {
   }
   /// A projected residual with what the held tolerances take of it when they come back.
   [[nodiscard]] Eigen::VectorXd release(Eigen::VectorXd left) const;
+  /// What is left of the residual beside a projected response at its best amplitude, with the tolerances come back as far as it lets them.
+  [[nodiscard]] Eigen::VectorXd left_beside(const Eigen::Ref<const Eigen::VectorXd>& x) const;
 };
 
 [[nodiscard]] Around around(const Predictor& predictor, const Fit& fit, const Weights& weights);

@@ -217,6 +217,13 @@ class Screening {
       column.norm2 = 0;
     }
     column.score = column.atom_score.sum();
+    if (column.resting > Column::kResting && column.norm2 > 0) {
+      const Eigen::VectorXd left = place_.left_beside(x);
+      column.atom_left = Eigen::VectorXd::Zero(atoms);
+      for (Eigen::Index i = 0; i < x.size(); ++i)
+        column.atom_left[static_cast<Eigen::Index>(data_.rows[static_cast<std::size_t>(i)].atom)] -=
+            x[i] * left[i];
+    }
     return column;
   }
 

@@ -10,7 +10,8 @@
 /// (decays of the free joint), the effect's own part is taken out of the scatter first: jackknife over blocks, Student's t. Where they are
 /// hardly any (a slip, a stop that is hardly touched), the score is measured by what blocks elsewhere scatter. `rare`: both,
 /// Bonferroni over as many columns. What rests within its runs (an offset, a drift of the day) is told from a sensor's zero that moves
-/// between runs by its runs alone: where those scatter more than their blocks do, T is Student's of the runs' scatter, as a normal's.
+/// between runs by its runs alone: where those scatter more than their blocks do, T is Student's of the runs' scatter, as a normal's. Scatter
+/// is of what is left beside the column, and beside tolerances that were held at a bound against it: they come back.
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -29,16 +30,20 @@ namespace isac::explain {
 
 /// One column of evidence: a response, projected.
 struct Column {
+  static constexpr double kResting =
+      0.5;  ///< of Σ x⊥² held by means of runs: the column is as certain as its runs are
+
   int hypothesis = -1;  ///< index in the library, −1 for the generic dictionary
   int shape = 0, amplitude = 0;
   std::string name;                       ///< of a dictionary column
   Chain chain = Chain::kTorque;           ///< of a dictionary column
   Eigen::VectorXd atom_score, atom_norm;  ///< of the shortest blocks: Σ x⊥ r, Σ x⊥²
-  double score = 0, norm2 = 0;            ///< Σ g_b, Σ x⊥²
-  double raw_norm2 = 0;                   ///< Σ x²: what was there before the projection
-  double chain_norm2[kChains] = {};       ///< Σ x⊥² of each chain
-  double plain_norm2[kChains] = {};       ///< the same of x⊥/σ as it is in time, before the noise's filter
-  double resting = 0;                     ///< share of Σ x⊥² that the means of its runs hold, 0 to 1
+  Eigen::VectorXd atom_left;    ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
+  double score = 0, norm2 = 0;  ///< Σ g_b, Σ x⊥²
+  double raw_norm2 = 0;         ///< Σ x²: what was there before the projection
+  double chain_norm2[kChains] = {};  ///< Σ x⊥² of each chain
+  double plain_norm2[kChains] = {};  ///< the same of x⊥/σ as it is in time, before the noise's filter
+  double resting = 0;                ///< share of Σ x⊥² that the means of its runs hold, 0 to 1
   double T = 0;
   double unit = 1;        ///< variance of its score per unit of norm, from the scatter of its blocks
   double carried_by = 0;  ///< blocks, effectively
