@@ -28,6 +28,7 @@ struct TiedRig {
   double encoder_play = 0;                 // rad, half of it, between joint and encoder
   double encoder_drift = 0;                // rad/s from eight o'clock on
   double encoder_slip = 0, slip_at = 0;    // rad, s after eight o'clock
+  double leak[2] = {0, 0}, deadband = 0;   // 1/s of each muscle; Pa of a valve that does not answer less
   double threshold = 0;                    // Pa that lift a bladder off
   double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
   double known_inertia = 0;                // kg m2 that is believed; 0: the true one
@@ -163,7 +164,9 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       } else {
         q[i] = u;
       }
-      p[i] += kStep / rig.T_C * (rig.K_C * q[i] - p[i]);
+      const double asked = rig.K_C * q[i] - p[i];
+      const double heard = std::copysign(std::max(0.0, std::abs(asked) - rig.deadband), asked);
+      p[i] += kStep * (heard / rig.T_C - rig.leak[i] * p[i]);
     }
     double near_inertia = rig.inertia, pulled = 0;
     if (free && rig.far_inertia > 0) {

@@ -71,8 +71,10 @@ class Predictor {
   std::shared_ptr<const Inputs> make_inputs(const ModelPoint& model, std::size_t run) const;
   void undo_angle_readings(const ModelPoint& model, std::size_t run, Inputs& in) const;
   void add_columns(std::size_t run, Inputs& in) const;
+  /// At every sample, or at one of `every` where no effect has a memory.
   std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
-                                        bool motion) const;
+                                        bool motion, std::size_t every = 1) const;
+  std::size_t thinned(const Hypothesis& effect, double sigma) const noexcept;
   double base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const;
   void pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                     std::vector<double> (&p)[2]) const;

@@ -126,7 +126,7 @@ double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::si
 }
 
 std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run,
-                                                 const Inputs& in, bool motion) const {
+                                                 const Inputs& in, bool motion, std::size_t every) const {
   const bool seed = data_->baseline.terms.empty();
   std::vector<double> sum;
   for (const Active& a : model.effects) {
@@ -134,7 +134,7 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
     if (h.info().hook != Hook::kTorque) continue;
     if (seed && (h.seen_by == SeenBy::kMotionOnly) != motion) continue;
     if (is_null(a)) continue;
-    if (sum.empty()) sum.assign(run.time.size(), 0.0);
+    if (sum.empty()) sum.assign((run.time.size() + every - 1) / every, 0.0);
     const double sign = data_->baseline.driven ? -1.0 : 1.0;
     const auto term = [&](int at) { return at >= 0 ? model.base[static_cast<std::size_t>(at)] : 0.0; };
     const BaselineOfPoint base{.stiffness = term(stiffness_),
@@ -149,7 +149,7 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
     JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {
       for (std::size_t k = 0; k < sum.size(); ++k)
-        sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k));
+        sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k * every));
       continue;
     }
     Memory memory(a);

@@ -69,22 +69,32 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
   return best;
 }
 
-/// Share of Σ x² that the means of runs (of each chain) hold.
-double held_by_runs(const Prepared& data, const Eigen::Ref<const Eigen::VectorXd>& x) {
-  double held = 0, sum = 0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    sum += x[static_cast<Eigen::Index>(i)];
-    ++count;
-    if (i + 1 < data.rows.size() && data.rows[i + 1].run == data.rows[i].run &&
-        data.rows[i + 1].chain == data.rows[i].chain)
-      continue;
-    held += sum * sum / static_cast<double>(count);
-    sum = 0;
-    count = 0;
+/// Rows of one chain in one atom, one after another.
+struct Stretch {
+  Eigen::Index from = 0, rows = 0, atom = 0;
+  int chain = 0;
+  bool ends_run = false;  ///< the last of its chain in its run
+};
+
+std::vector<Stretch> stretches_of(const Prepared& data) {
+  std::vector<Stretch> stretches;
+  const Row* last = nullptr;
+  for (const Row& row : data.rows) {
+    const bool same_run = last != nullptr && row.run == last->run && row.chain == last->chain;
+    if (!same_run && last != nullptr) stretches.back().ends_run = true;
+    if (!same_run || row.atom != last->atom) {
+      const Eigen::Index from = last == nullptr ? 0 : stretches.back().from + stretches.back().rows;
+      stretches.push_back({.from = from,
+                           .rows = 0,
+                           .atom = static_cast<Eigen::Index>(row.atom),
+                           .chain = static_cast<int>(row.chain),
+                           .ends_run = false});
+    }
+    ++stretches.back().rows;
+    last = &row;
   }
-  const double all = x.squaredNorm();
-  return all > 0 ? held / all : 0.0;
+  if (last != nullptr) stretches.back().ends_run = true;
+  return stretches;
 }
 
 /// What one hypothesis, or some functions of the dictionary, add to the evidence.
@@ -107,7 +117,12 @@ bool is_one_way(const Hypothesis& h, const Values& way, bool alone) {
 class Screening {
  public:
   Screening(const Around& place, const Library& library, Responses* kept)
-      : place_(place), library_(library), data_(place.predictor->data()), generic_(data_), kept_(kept) {}
+      : place_(place),
+        library_(library),
+        data_(place.predictor->data()),
+        generic_(data_),
+        kept_(kept),
+        stretches_(stretches_of(data_)) {}
 
   std::size_t functions() const { return generic_.size(); }
 
@@ -197,20 +212,31 @@ class Screening {
     column.raw_norm2 = raw_norm2;
     column.atom_score = Eigen::VectorXd::Zero(atoms);
     column.atom_norm = Eigen::VectorXd::Zero(atoms);
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
-      const Row& row = data_.rows[static_cast<std::size_t>(i)];
-      const auto b = static_cast<Eigen::Index>(row.atom);
+    double held_by_runs = 0, sum = 0;
+    Eigen::Index count = 0;
+    for (const Stretch& s : stretches_) {
+      const auto part = x.segment(s.from, s.rows);
+      const double norm2 = part.squaredNorm();
       // Prediction − measured: an effect that is missing has the other sign.
-      column.atom_score[b] -= x[i] * place_.residual[i];
-      column.atom_norm[b] += x[i] * x[i];
-      column.chain_norm2[static_cast<int>(row.chain)] += x[i] * x[i];
+      column.atom_score[s.atom] -= part.dot(place_.residual.segment(s.from, s.rows));
+      column.atom_norm[s.atom] += norm2;
+      column.chain_norm2[s.chain] += norm2;
+      sum += part.sum();
+      count += s.rows;
+      if (!s.ends_run) continue;
+      held_by_runs += sum * sum / static_cast<double>(count);
+      sum = 0;
+      count = 0;
     }
-    column.resting = held_by_runs(data_, x);
-    const Eigen::VectorXd plain = unfiltered(data_, *place_.weights, x);
-    for (Eigen::Index i = 0; i < plain.size(); ++i)
-      column.plain_norm2[static_cast<int>(data_.rows[static_cast<std::size_t>(i)].chain)] +=
-          plain[i] * plain[i];
+    if (place_.weights->is_coloured()) {
+      const Eigen::VectorXd plain = unfiltered(data_, *place_.weights, x);
+      for (const Stretch& s : stretches_)
+        column.plain_norm2[s.chain] += plain.segment(s.from, s.rows).squaredNorm();
+    } else {
+      std::copy(std::begin(column.chain_norm2), std::end(column.chain_norm2), std::begin(column.plain_norm2));
+    }
     column.norm2 = column.atom_norm.sum();
+    column.resting = column.norm2 > 0 ? held_by_runs / column.norm2 : 0.0;
     // A third of a percent of a response is how its column was low-passed, not what the effect does.
     if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
       column.atom_score.setZero();
@@ -220,9 +246,8 @@ class Screening {
     if (column.resting > Column::kResting && column.norm2 > 0) {
       const Eigen::VectorXd left = place_.left_beside(x);
       column.atom_left = Eigen::VectorXd::Zero(atoms);
-      for (Eigen::Index i = 0; i < x.size(); ++i)
-        column.atom_left[static_cast<Eigen::Index>(data_.rows[static_cast<std::size_t>(i)].atom)] -=
-            x[i] * left[i];
+      for (const Stretch& s : stretches_)
+        column.atom_left[s.atom] -= x.segment(s.from, s.rows).dot(left.segment(s.from, s.rows));
     }
     return column;
   }
@@ -274,6 +299,7 @@ class Screening {
   const Prepared& data_;
   const Dictionary generic_;
   Responses* kept_;
+  const std::vector<Stretch> stretches_;
 };
 
 }  // namespace

@@ -24,6 +24,7 @@ constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidat
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kLargeForSure =
     25;  // units of noise, five sigma: whoever is so large and not found has too few blocks
+constexpr double kThreeSigma = 9;  // units of noise
 constexpr double kMinimumBlocks = 24;
 constexpr double kConvention = 0.12;  // relative
 constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
@@ -287,7 +288,23 @@ class Search {
     // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
     const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
     step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
+    leave_to_slow_noise(step);
     return step;
+  }
+
+  /// What blocks agree on may still be no more than the noise's own model expects of the best of so many, where that noise is slow.
+  void leave_to_slow_noise(Step& step) {
+    if (step.trials.empty() || units_closed(step.trials.front()) >= kThreeSigma) return;
+    const double sigma = std::sqrt(std::max(0.0, units_closed(step.trials.front())));
+    step.gate.significant = false;
+    step.gate.p_value =
+        std::max(step.gate.p_value, std::min(1.0, static_cast<double>(step.screen.candidates.size()) *
+                                                      std::erfc(sigma / std::sqrt(2.0))));
+    const std::string id = ranking_.id_of(step.trials.front());
+    const std::string sentence = fmt::format(
+        "ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many", sigma);
+    found_.notes.push_back({id, sentence});
+    say(id + ": " + sentence);
   }
 
   bool is_implausible(const Trial& t) {
@@ -341,16 +358,13 @@ class Search {
       if (take) {
         const double size = step.trials.front().material;
         take = size >= options_.material;
-        // What is left over after a good name is small; a remainder that needs another name must be as clear as the first,
-        // or the first was only like the truth.
-        if (take && !found_.added.empty())
-          take = size >= kSecondOfFirst * first_size_ && size >= kSecondOfFloor;
+        if (take && !found_.added.empty()) take = is_clear_enough(size);
         if (take && found_.added.empty()) first_size_ = size;
       }
+      if (open && !take && found_.added.size() == 1 && a_rival_goes_better_with(step)) continue;
       found_.steps.push_back(std::move(step));
       if (take) {
         const Trial& best = found_.steps.back().trials.front();
-        doubt_if_slight(best);
         found_.added.push_back(best.hypothesis);
         move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
       }
@@ -364,16 +378,6 @@ class Search {
     }
   }
 
-  /// What blocks agree on may still be no more than the noise's own model expects, where that noise is slow.
-  void doubt_if_slight(const Trial& best) {
-    constexpr double kThreeSigma = 9;
-    const double closes = units_closed(best);
-    if (closes >= kThreeSigma) return;
-    found_.doubts.push_back(fmt::format("Beside noise as slow as this {} is only {:.1f} sigma large.",
-                                        ranking_.id_of(best), std::sqrt(std::max(0.0, closes))));
-    say(found_.doubts.back());
-  }
-
   double units_closed(const Trial& t) const {
     return (place_.residual.squaredNorm() - t.loss) /
            compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit;
@@ -381,7 +385,20 @@ class Search {
 
   bool is_open(const Step& step) const {
     return step.gate.significant && step.gate.material &&
-           (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_);
+           (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_ ||
+            is_worth_a_second_name(step));
+  }
+
+  /// Beside a wrong share of the first, a second effect shows little until both are refitted.
+  bool is_worth_a_second_name(const Step& step) const {
+    return !step.trials.empty() && is_clear_enough(step.trials.front().material) &&
+           units_closed(step.trials.front()) > kLargeForSure;
+  }
+
+  /// What is left over after a good name is small; a remainder that needs another name must be as clear as the first, or the first was
+  /// only like the truth.
+  bool is_clear_enough(double size) const {
+    return size >= std::max(kSecondOfFirst * first_size_, kSecondOfFloor);
   }
 
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
@@ -514,12 +531,7 @@ class Search {
       rest = refitted(std::move(rest));
       if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
       say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
-      std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
-                  trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-      ranking_.mark(trials);
-      for (Trial& t : trials)
-        if (ranking_.id_of(t) == first) t.in_set = false;
-      Ranking::weigh(trials);
+      put_first(i);
       found_.steps.push_back(std::move(rest));
       found_.adequate = true;
       return true;
@@ -527,6 +539,46 @@ class Search {
     found_.added.back() = trials.front().hypothesis;
     move_to(kept);
     return false;
+  }
+
+  /// The effect that stood first leaves too little for a second name and too much for none: one of its rivals, which fitted nearly as well
+  /// alone, may fit better with that second one, and leave it larger. It takes the place of the first.
+  bool a_rival_goes_better_with(const Step& step) {
+    if (a_rival_was_tried_ || step.trials.empty()) return false;
+    a_rival_was_tried_ = true;
+    std::vector<Trial>& trials = found_.steps.front().trials;
+    const Trial& second = step.trials.front();
+    const auto loss_of = [&](const Trial& first) { return with({first, second}).loss; };
+    double least = loss_of(trials.front()) - kThreeSigma * step.screen.noise_unit;
+    std::size_t best = 0, tried = 0;
+    for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
+      if (!cannot_rule_out(trials[i].behind) || ranking_.id_of(trials[i]) == ranking_.id_of(second)) continue;
+      ++tried;
+      const double loss = loss_of(trials[i]);
+      if (loss >= least) continue;
+      least = loss;
+      best = i;
+    }
+    if (best == 0) return false;
+    say(fmt::format("{} goes better with {} than {} does: it takes its place", ranking_.id_of(trials[best]),
+                    ranking_.id_of(second), ranking_.id_of(trials.front())));
+    put_first(best);
+    found_.added.back() = trials.front().hypothesis;
+    first_size_ = trials.front().material;
+    move_to(with({trials.front()}));
+    return true;
+  }
+
+  /// Of the first step's trials this one is taken; what stood first is ruled out.
+  void put_first(std::size_t i) {
+    std::vector<Trial>& trials = found_.steps.front().trials;
+    const std::string first = ranking_.id_of(trials.front());
+    std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
+                trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    ranking_.mark(trials);
+    for (Trial& t : trials)
+      if (ranking_.id_of(t) == first) t.in_set = false;
+    Ranking::weigh(trials);
   }
 
   Fit with(const std::vector<Trial>& effects) const {
@@ -597,7 +649,8 @@ class Search {
   Around place_;                                    ///< of found_.model
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   Responses responses_;
-  double first_size_ = 0;            ///< of the first effect, over the floor
+  double first_size_ = 0;  ///< of the first effect, over the floor
+  bool a_rival_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
 

@@ -101,10 +101,12 @@ struct NoiseFilter {
   }
 };
 
+bool Weights::is_coloured() const noexcept {
+  return std::any_of(std::begin(colour), std::end(colour), is_slow);
+}
+
 void Weights::take(const Prepared& data) {
-  filter = std::any_of(std::begin(colour), std::end(colour), is_slow)
-               ? std::make_shared<const NoiseFilter>(data, *this)
-               : nullptr;
+  filter = is_coloured() ? std::make_shared<const NoiseFilter>(data, *this) : nullptr;
 }
 
 namespace {
@@ -112,9 +114,7 @@ namespace {
 std::shared_ptr<const NoiseFilter> filter_of(const Prepared& data, const Weights& weights) {
   if (weights.filter && weights.filter->data == &data && weights.filter->rows == data.rows.size())
     return weights.filter;
-  return std::any_of(std::begin(weights.colour), std::end(weights.colour), is_slow)
-             ? std::make_shared<const NoiseFilter>(data, weights)
-             : nullptr;
+  return weights.is_coloured() ? std::make_shared<const NoiseFilter>(data, weights) : nullptr;
 }
 
 }  // namespace

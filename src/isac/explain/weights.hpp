@@ -41,6 +41,7 @@ struct Weights {
       filter;  ///< of these colours and the data that take() saw; any other is made when it is needed
 
   void take(const Prepared& data);
+  [[nodiscard]] bool is_coloured() const noexcept;
 };
 
 /// Rows in the chains' units → weighted rows e.

@@ -73,7 +73,7 @@ void add_answer(Document& page, const Explanation& e) {
   std::vector<std::string> lines = {verdict_sentence(e)};
   if (const std::string gap = gap_sentence(e); !gap.empty()) lines.push_back(gap);
   if ((e.verdict == Verdict::kFamily || e.verdict == Verdict::kNotSeparable) && e.next_experiment)
-    lines.push_back("To settle it: " + e.next_experiment->sentence);
+    lines.push_back("To settle it: " + pretty_sentence(e.next_experiment->sentence));
   page.box(box_of(e.verdict), "The answer", lines);
 
   const explain::Gap& gap = e.gap;
@@ -147,7 +147,7 @@ void add_where(Document& page, const ExplainReportInput& input) {
 std::vector<std::string> evidence_of(const Candidate& candidate, bool supports) {
   std::vector<std::string> out;
   for (const explain::Evidence& evidence : candidate.evidence)
-    if (evidence.supports == supports) out.push_back(evidence.sentence);
+    if (evidence.supports == supports) out.push_back(pretty_sentence(evidence.sentence));
   return out;
 }
 
@@ -249,7 +249,8 @@ void add_numbers(Document& page, const Explanation& e) {
               .columns = {{"Parameter"}, {"Before", true}, {"After", true}, {"Unit"}, {"Change"}}};
   for (const explain::BaseChange& change : e.base_changes) {
     table.rows.push_back({change.name, number(change.before, 4), number(change.after, 4),
-                          pretty_unit(change.unit), change.sentence.empty() ? "–" : change.sentence});
+                          pretty_unit(change.unit),
+                          change.sentence.empty() ? "–" : pretty_sentence(change.sentence)});
   }
   if (!table.rows.empty()) page.table(table);
 }
@@ -277,7 +278,7 @@ void add_next(Document& page, const ExplainReportInput& input) {
   if (!e.next_experiment) return;
   const explain::NextExperiment& next = *e.next_experiment;
   page.heading("What to record next");
-  std::vector<std::string> lines = {next.sentence};
+  std::vector<std::string> lines = {pretty_sentence(next.sentence)};
   if (!next.separates_a.empty() && !next.separates_b.empty()) {
     lines.push_back("It separates " + name_of(next.separates_a) + " from " + name_of(next.separates_b) +
                     ": " + fixed_decimals(next.separation_now, 1) + " σ now, " +
@@ -346,7 +347,7 @@ void add_trials(Document& page, const Explanation& e) {
                  "any colour.");
   std::vector<std::string> lines;
   for (const explain::TrialNote& trial : e.trials)
-    lines.push_back(trial.id.empty() ? trial.sentence : name_of(trial.id) + ": " + trial.sentence);
+    lines.push_back((trial.id.empty() ? "" : name_of(trial.id) + ": ") + pretty_sentence(trial.sentence));
   if (!lines.empty()) page.bullets(lines);
 }
 

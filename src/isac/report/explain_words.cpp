@@ -64,7 +64,7 @@ std::string unknown(const Explanation& e) {
 }  // namespace
 
 std::string verdict_sentence(const Explanation& e) {
-  if (!e.summary.empty()) return e.summary;
+  if (!e.summary.empty()) return pretty_sentence(e.summary);
   switch (e.verdict) {
     case Verdict::kNone:
       return "Nothing is missing: what the model leaves over cannot be told from noise.";

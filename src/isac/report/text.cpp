@@ -138,6 +138,30 @@ std::string pretty_unit(std::string_view unit) {
   return clean_utf8(out);
 }
 
+std::string pretty_sentence(std::string_view sentence) {
+  constexpr std::array kUnits = {"cm2", "rad2", "rad3", "rad4", "s2", "s3", "kg m2"};
+  const auto is_word = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  std::string out;
+  for (std::size_t i = 0; i < sentence.size();) {
+    const std::string_view rest = sentence.substr(i);
+    const bool begins = i == 0 || !is_word(sentence[i - 1]);
+    const auto unit = std::find_if(kUnits.begin(), kUnits.end(), [&](std::string_view u) {
+      return begins && rest.starts_with(u) && (rest.size() == u.size() || !is_word(rest[u.size()]));
+    });
+    if (unit == kUnits.end()) {
+      out += sentence[i++];
+      continue;
+    }
+    const std::string_view found = *unit;
+    out += found.substr(0, found.size() - 1);
+    out += pretty_unit(std::string("s") + found.back()).substr(1);
+    i += found.size();
+  }
+  return out;
+}
+
 std::string clean_utf8(std::string_view text) {
   std::string out;
   out.reserve(text.size());
