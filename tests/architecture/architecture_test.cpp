@@ -63,7 +63,9 @@ TEST(Architecture, has_only_the_agreed_folders_and_files_at_the_top) {
                                         "fixtures",
                                         "src",
                                         "tests",
-                                        "build",
+                                        "build",                  // what .gitignore names:
+                                        "demo",                   // what ./run makes,
+                                        "compile_commands.json",  // and what editors read
                                         "CMakeLists.txt",
                                         "CMakePresets.json",
                                         "CHANGELOG.md",
