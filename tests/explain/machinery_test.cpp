@@ -166,6 +166,29 @@ TEST(Responses, of_linear_effects_are_linear) {
   }
 }
 
+TEST(Responses, of_torques_at_one_sample_in_some_are_those_at_every_sample) {
+  const Day& day = quiet_day();
+  Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(day.predictor.rows()));
+  day.predictor.predict(day.baseline.model, kAllChains, here);
+  int compared = 0;
+  for (const Hypothesis& h : day.library.hypotheses) {
+    if (!day.predictor.adds_up(day.baseline.model, h)) continue;
+    for (const std::size_t shape : {std::size_t{0}, h.shapes.size() - 1}) {
+      const Active effect{&h, h.shapes[shape]};
+      Eigen::VectorXd alone = Eigen::VectorXd::Zero(here.size()), with = here;
+      day.predictor.predict_addition(day.baseline.model, effect, alone);
+      ModelPoint model = day.baseline.model;
+      model.effects.push_back(effect);
+      day.predictor.predict(model, kAllChains, with);  // every sample, with everything else
+      EXPECT_LE((with - here - alone).norm(),
+                1e-4 * alone.norm() + 1e-12 * here.norm())  // tension_loss has kinks
+          << h.info().id << " " << shape;
+      compared += alone.norm() > 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(compared, 30);
+}
+
 TEST(Refine, finds_every_effect_that_the_data_holds_without_noise) {
   const Day& day = quiet_day();
   Around place = around(day.predictor, day.baseline, day.weights);

@@ -289,15 +289,20 @@ void solve(const Predictor& predictor, Fit& fit, const Weights& weights, int rou
   move_to(predictor, weights, found.x, fit);
 }
 
-/// Chains that hang together with those given through a common parameter.
-unsigned closure(unsigned chains, const ModelPoint& model) {
+/// Chains that hang together with those given: through a common parameter, or because the zero that the torque's rows tell of is taken off
+/// the motion's.
+unsigned closure(unsigned chains, const ModelPoint& model, bool one_zero) {
+  const auto with_zero = [&](unsigned c) {
+    return one_zero && (c & kForceChains) != 0 ? c | kForceChains : c;
+  };
   if ((chains & kPressureChains) != 0) chains |= kPressureChains;
+  chains = with_zero(chains);
   for (bool grown = true; grown;) {
     grown = false;
     for (const Active& a : model.effects) {
       const unsigned c = a.hypothesis->chains;
       if ((c & chains) != 0 && (c & ~chains) != 0) {
-        chains |= c;
+        chains = with_zero(chains | c);
         grown = true;
       }
     }
@@ -347,7 +352,7 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
     fit.model.effects.push_back(a);
     chains |= a.hypothesis->chains;
   }
-  fit.chains = closure(chains, fit.model);
+  fit.chains = closure(chains, fit.model, weights.one_zero);
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
   add_rest(predictor, fit.model, fit.chains, fit.coordinates);
   add_effects(fit.model, fit.tolerances, fit.chains, fit.coordinates);

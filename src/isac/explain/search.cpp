@@ -292,14 +292,16 @@ class Search {
     return step;
   }
 
-  /// What blocks agree on may still be no more than the noise's own model expects of the best of so many, where that noise is slow.
+  /// What blocks agree on may still be no more than the noise's own model makes of the best of so many, where that noise is slow. (A first
+  /// effect is given the benefit of three sigma: that noise is a model.)
   void leave_to_slow_noise(Step& step) {
-    if (step.trials.empty() || units_closed(step.trials.front()) >= kThreeSigma) return;
-    const double sigma = std::sqrt(std::max(0.0, units_closed(step.trials.front())));
+    if (step.trials.empty()) return;
+    const double units = std::max(0.0, units_closed(step.trials.front())), sigma = std::sqrt(units);
+    const double best_of_many =
+        std::min(1.0, static_cast<double>(step.screen.candidates.size()) * std::erfc(sigma / std::sqrt(2.0)));
+    if (found_.added.empty() ? units >= kThreeSigma : best_of_many <= options_.significance) return;
     step.gate.significant = false;
-    step.gate.p_value =
-        std::max(step.gate.p_value, std::min(1.0, static_cast<double>(step.screen.candidates.size()) *
-                                                      std::erfc(sigma / std::sqrt(2.0))));
+    step.gate.p_value = std::max(step.gate.p_value, best_of_many);
     const std::string id = ranking_.id_of(step.trials.front());
     const std::string sentence = fmt::format(
         "ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many", sigma);
