@@ -128,7 +128,8 @@ void print_explanation(const explain::Explanation& e, const std::vector<std::str
     fmt::print("\n");
     print_parameters(e.base);
   }
-  for (const explain::BaseChange& change : e.base_changes) sheet.row("", report::pretty_sentence(change.sentence));
+  for (const explain::BaseChange& change : e.base_changes)
+    sheet.row("", report::pretty_sentence(change.sentence));
   fmt::print("\n");
   if (e.next_experiment) sheet.row("next", e.next_experiment->sentence);
   print_could_hide(sheet, e);
