@@ -1,8 +1,4 @@
 // isac-explain: where simulation and measurement disagree, what is missing, and the proof (docs/reference/isac-explain.md).
-#if defined(__GLIBC__)
-#include <malloc.h>
-#endif
-
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
@@ -91,11 +87,6 @@ int run(Words words) {
 }  // namespace
 
 int main(int argc, char** argv) {
-#if defined(__GLIBC__)
-  // Columns of a megabyte are taken and given back by the thousand: kept, they are not cleared by the kernel each time.
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
-#endif
   CLI::App app{
       "Finds where simulation and measurement disagree, names the missing effect, and shows on held-out runs "
       "how much of "
