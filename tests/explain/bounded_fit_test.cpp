@@ -93,6 +93,25 @@ TEST(BoundedFit, follows_a_bent_valley) {
   EXPECT_NEAR(held.x[1], 0.25, 1e-6);
 }
 
+TEST(BoundedFit, leaves_alone_what_the_data_do_not_feel) {
+  // Within the second's reach nothing changes but by the rounding of its slope; beyond, the loss is a wall.
+  const Evaluate line_before_a_wall = [](const Eigen::VectorXd& x, Eigen::VectorXd& r,
+                                         Eigen::MatrixXd* jacobian) {
+    r = Eigen::VectorXd::Constant(100, 30 * (x[0] - 1)) + Eigen::VectorXd::LinSpaced(100, -1, 1);
+    if (x[1] < 0.5) r.array() += 1e3 * (0.5 - x[1]);
+    if (jacobian != nullptr) {
+      jacobian->resize(100, 2);
+      jacobian->col(0).setConstant(30);
+      jacobian->col(1) = Eigen::VectorXd::LinSpaced(100, -1e-7, 1e-7);
+    }
+    return true;
+  };
+  const BoundedFit fit = bounded_fit(line_before_a_wall, Eigen::Vector2d(3, 0.6), Eigen::Vector2d(-9, 0),
+                                     Eigen::Vector2d(9, 2), {.rounds = 6});
+  EXPECT_NEAR(fit.x[0], 1, 1e-6);
+  EXPECT_EQ(fit.x[1], 0.6);
+}
+
 TEST(BoundedFit, says_that_it_stopped_where_nothing_is_defined) {
   const Evaluate nowhere = [](const Eigen::VectorXd&, Eigen::VectorXd&, Eigen::MatrixXd*) { return false; };
   const Eigen::VectorXd one = Eigen::VectorXd::Ones(1);

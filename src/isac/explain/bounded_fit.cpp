@@ -86,13 +86,19 @@ BoundedFit bounded_fit(const Evaluate& evaluate, Eigen::VectorXd start, const Ei
     H = Eigen::MatrixXd(H.selfadjointView<Eigen::Lower>());
     const Eigen::VectorXd g = jacobian.transpose() * fit.residual;
     const double largest = std::max(H.diagonal().maxCoeff(), 1e-300);
+    // What the data do not feel stays where it is: a stop that nothing reached would be moved by the noise of its slope, into what was reached.
+    Eigen::VectorXd low = lower - fit.x, high = upper - fit.x;
+    for (Eigen::Index i = 0; i < low.size(); ++i) {
+      const double range = upper[i] - lower[i];
+      if (H(i, i) * range * range < options.tolerance * fit.loss) low[i] = high[i] = 0;
+    }
     bool moved = false;
     while (fit.rounds < options.rounds) {
       ++fit.rounds;
       Eigen::MatrixXd damped = H;
       for (Eigen::Index i = 0; i < H.rows(); ++i)
         damped(i, i) += (damping + 1e-12) * H(i, i) + 1e-14 * largest;
-      const Eigen::VectorXd d = bounded_quadratic(damped, g, lower - fit.x, upper - fit.x);
+      const Eigen::VectorXd d = bounded_quadratic(damped, g, low, high);
       const double promised = -(2 * g.dot(d) + d.dot(H * d));
       if (!(promised > options.tolerance * fit.loss)) {
         fit.converged = true;

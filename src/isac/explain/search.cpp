@@ -29,7 +29,7 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kConvention = 0.12;  // relative
 constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;  // of the linear gain
-constexpr double kSmallRemainder = 0.2;  // of the first effect's size: less does not cast doubt on its name
+constexpr double kSmallRemainder = 0.2;  // of the largest effect's size: less does not cast doubt on its name
 constexpr double kBeaten = 1.645;        // sigma, by functions without a name
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
@@ -274,7 +274,7 @@ class Search {
 
   Step refitted(Step step) {
     const double least =
-        std::max(options_.material, found_.added.empty() ? 0.0 : kSmallRemainder * first_size_);
+        std::max(options_.material, found_.added.empty() ? 0.0 : kSmallRemainder * largest_size_);
     if (!step.gate.significant || step.gate.size < kWorthALook * least) return step;
     step.trials = refit_all(shortlist(step.screen));
     std::set<std::string> ignored;
@@ -333,7 +333,7 @@ class Search {
   }
 
   void forward() {
-    first_size_ = 0;
+    first_size_ = largest_size_ = 0;
     for (;;) {
       const bool narrow = !found_.added.empty() && !look_.contenders.empty();
       if (narrow) asked_for_ = look_.contenders;
@@ -362,6 +362,7 @@ class Search {
         take = size >= options_.material;
         if (take && !found_.added.empty()) take = is_clear_enough(size);
         if (take && found_.added.empty()) first_size_ = size;
+        if (take) largest_size_ = std::max(largest_size_, size);
       }
       if (open && !take && found_.added.size() == 1 && a_rival_goes_better_with(step)) continue;
       found_.steps.push_back(std::move(step));
@@ -387,7 +388,7 @@ class Search {
 
   bool is_open(const Step& step) const {
     return step.gate.significant && step.gate.material &&
-           (found_.added.empty() || step.gate.size >= kSmallRemainder * first_size_ ||
+           (found_.added.empty() || step.gate.size >= kSmallRemainder * largest_size_ ||
             is_worth_a_second_name(step));
   }
 
@@ -566,7 +567,7 @@ class Search {
                     ranking_.id_of(second), ranking_.id_of(trials.front())));
     put_first(best);
     found_.added.back() = trials.front().hypothesis;
-    first_size_ = trials.front().material;
+    first_size_ = largest_size_ = trials.front().material;
     move_to(with({trials.front()}));
     return true;
   }
@@ -652,6 +653,8 @@ class Search {
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   Responses responses_;
   double first_size_ = 0;  ///< of the first effect, over the floor
+  double largest_size_ =
+      0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
   bool a_rival_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
