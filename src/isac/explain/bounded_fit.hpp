@@ -5,6 +5,7 @@
 ///
 /// The bounds are part of the step's own problem, solved exactly by its active set. A trust region that only projects its step back onto
 /// the bounds (as Ceres 2.1 does) creeps where the best point lies on a bound, and tolerances lie there often.
+/// A parameter that the data do not feel, |J_i|² (u_i − l_i)² < tolerance · |r|², is not moved in that step.
 /// Threads: a function. Errors: none; `converged` is false where the residual is not finite or the rounds ran out.
 /// Source: Nocedal and Wright, Numerical Optimization, 10.3 and 16.7.
 #pragma once

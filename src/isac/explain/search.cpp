@@ -631,10 +631,10 @@ class Search {
     move_to(with(chosen));
     if (changed) {
       last = step_here();
-      const double first =
-          steps.empty() || steps.front().trials.empty() ? 0.0 : steps.front().trials.front().material;
+      double largest = 0;
+      for (const Trial& t : chosen) largest = std::max(largest, t.material);
       found_.adequate =
-          !(last.gate.significant && last.gate.material && last.gate.size >= kSmallRemainder * first);
+          !(last.gate.significant && last.gate.material && last.gate.size >= kSmallRemainder * largest);
     }
     steps.push_back(std::move(last));
     found_.steps = std::move(steps);
