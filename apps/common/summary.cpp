@@ -15,8 +15,10 @@ void print_parameters(const std::vector<Estimated>& parameters) {
              "unit");
   for (const Estimated& p : parameters) {
     if (p.identifiable) {
-      fmt::print("{:<{}} {:>13.6g}  {:>11.3g}  {:<27} {}\n", p.name, width, p.value, p.std_error,
-                 fmt::format("[{:.6g}, {:.6g}]", p.ci_low, p.ci_high), p.unit);
+      const bool told = std::isfinite(p.std_error) || p.reason.empty();
+      fmt::print("{:<{}} {:>13.6g}  {:>11}  {:<27} {}\n", p.name, width, p.value,
+                 told ? fmt::format("{:.3g}", p.std_error) : "-",
+                 told ? fmt::format("[{:.6g}, {:.6g}]", p.ci_low, p.ci_high) : p.reason, p.unit);
     } else {
       fmt::print("{:<{}} {:>13}  {}\n", p.name, width, "refused", p.reason);
     }

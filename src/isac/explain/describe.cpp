@@ -28,7 +28,9 @@ std::string joined(const std::vector<std::string>& words) {
 std::string numbers_of(const Candidate& c) {
   std::vector<std::string> words;
   for (const Estimated& p : c.parameters)
-    if (std::isfinite(p.value)) words.push_back(with_error(p.name, p.value, p.std_error, p.unit));
+    if (std::isfinite(p.value))
+      words.push_back(with_error(p.name, p.value, p.std_error, p.unit) +
+                      (p.reason.empty() ? "" : " (" + p.reason + ")"));
   return joined(words);
 }
 

@@ -89,12 +89,12 @@ struct CouldHide {
 
 /// One run of a plan: what `isac-log --plan` holds and sweeps. Units as named.
 struct PlannedRun {
-  std::string experiment;  ///< "constant-pressure", "constant-angle", "free", "pcu-step"
+  std::string experiment{};  ///< "constant-pressure", "constant-angle", "free", "pcu-step"
   double seconds = 30;
   double delta_pressure_kgcm2 = 0, mean_pressure_kgcm2 = kNotKnown;
   double amplitude_rad = 0.4, middle_rad = kNotKnown, peak_speed_rad_s = 1;
   double pressure_swing_kgcm2 = 0, pressure_period_s = 8;
-  std::string waveform;  ///< of the commanded pressure or the sweep: "triangle", "sine", "steps", "hold"
+  std::string waveform{};  ///< of the commanded pressure or the sweep: "triangle", "sine", "steps", "hold"
 };
 
 struct NextExperiment {

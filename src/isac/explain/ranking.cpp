@@ -112,6 +112,7 @@ void Ranking::weigh(std::vector<Trial>& trials) {
     // truth so far behind.
     const double behind = t.behind.separation < kTwinLimit ? 0.0 : std::max(0.0, t.behind.t);
     t.weight = t.in_set ? std::exp(-0.5 * behind * behind) : 0.0;
+    if (&t == &trials.front()) t.weight *= kFirst;
     sum += t.weight;
   }
   for (Trial& t : trials) t.weight *= kSurest / sum;

@@ -10,8 +10,16 @@
 namespace isac::explain {
 namespace {
 
-void give_interval(Estimated& e, double error, double degrees) {
-  if (!std::isfinite(error)) return;
+constexpr const char* kNotTold = "these runs do not tell it";
+constexpr const char* kAtItsEnd = "at the end of its range";
+
+/// `range`: of all values that it may have, in its own unit; an error beyond it says that the runs do not feel the parameter. The value stays,
+/// because the model was fitted with it.
+void give_interval(Estimated& e, double error, double degrees, double range) {
+  if (!(error <= range)) {
+    e.reason = kNotTold;
+    return;
+  }
   e.std_error = error;
   const double reach = error * series::student_t_limit(0.95, degrees);
   e.ci_low = e.value - reach;
@@ -48,8 +56,22 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
   std::vector<Coordinate> used;
   const Eigen::MatrixXd slopes = sensitivities(predictor, fit, weights, &used);
   std::vector<Eigen::Index> columns;
-  for (Eigen::Index j = 0; j < slopes.cols(); ++j)
-    if (slopes.col(j).allFinite() && slopes.col(j).squaredNorm() > 0) columns.push_back(j);
+  const auto effect_parameter = [&](const Coordinate& c) -> Estimated* {
+    if (c.effect < static_cast<int>(fit.tolerances)) return nullptr;
+    return &out.effects[static_cast<std::size_t>(c.effect) - fit.tolerances]
+                       [static_cast<std::size_t>(c.component)];
+  };
+  for (Eigen::Index j = 0; j < slopes.cols(); ++j) {
+    const Coordinate& c = used[static_cast<std::size_t>(j)];
+    Estimated* of_effect = effect_parameter(c);
+    // A leak that can only be a leak and would rather be none takes no freedom from the others.
+    const bool at_its_end = of_effect != nullptr && (fit.value(c) <= c.lower || fit.value(c) >= c.upper);
+    if (slopes.col(j).allFinite() && slopes.col(j).squaredNorm() > 0 && !at_its_end) {
+      columns.push_back(j);
+    } else if (of_effect != nullptr) {
+      of_effect->reason = at_its_end ? kAtItsEnd : kNotTold;
+    }
+  }
   const auto m = static_cast<Eigen::Index>(columns.size());
   if (m == 0) return out;
   // Columns of unit norm: H is then a matrix of correlations.
@@ -85,12 +107,14 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
                  degrees = v.degrees_of_freedom[j];
     if (c.base >= 0) {
       const auto b = static_cast<std::size_t>(c.base);
-      give_interval(out.base[b], error / predictor.base()[b].si_per_unit, degrees);
-    } else if (c.effect >= static_cast<int>(fit.tolerances)) {
-      const auto e = static_cast<std::size_t>(c.effect) - fit.tolerances;
+      const BaseParameter& parameter = predictor.base()[b];
+      give_interval(out.base[b], error / parameter.si_per_unit, degrees,
+                    (parameter.upper - parameter.lower) / parameter.si_per_unit);
+    } else if (Estimated* told = effect_parameter(c)) {
+      const Hypothesis& h = *fit.model.effects[static_cast<std::size_t>(c.effect)].hypothesis;
       const auto p = static_cast<std::size_t>(c.component);
-      const auto& info = fit.model.effects[static_cast<std::size_t>(c.effect)].hypothesis->info();
-      give_interval(out.effects[e][p], error / info.parameters[p].si_per_unit, degrees);
+      const double unit = h.info().parameters[c.component].si_per_unit;
+      give_interval(*told, error / unit, degrees, (h.upper[p] - h.lower[p]) / unit);
     }
   }
   return out;

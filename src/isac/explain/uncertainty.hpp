@@ -17,8 +17,10 @@
 namespace isac::explain {
 
 struct Uncertain {
-  std::vector<Estimated> base;                  ///< as Predictor::base()
-  std::vector<std::vector<Estimated>> effects;  ///< as Found::added, parameter by parameter
+  std::vector<Estimated> base;  ///< as Predictor::base()
+  /// As Found::added, parameter by parameter. One whose error is wider than its range, that no row feels or that stands at
+  /// the end of its range has its value, no error and a reason.
+  std::vector<std::vector<Estimated>> effects;
 };
 
 [[nodiscard]] Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weights& weights);

@@ -26,6 +26,7 @@ void add_parameters(Document& page, std::span<const Estimated> parameters, const
       refused.push_back(parameter.name + ": " + parameter.reason);
       continue;
     }
+    if (!parameter.reason.empty()) refused.push_back(parameter.name + ": " + parameter.reason);
     const Rounded shown = with_error(parameter.value, parameter.std_error);
     const double relative = 100 * std::abs(parameter.std_error / parameter.value);
     table.rows.push_back({parameter.name, shown.value, shown.error,
@@ -48,7 +49,8 @@ std::string in_words(const Estimated& parameter) {
   if (!parameter.identifiable || !std::isfinite(parameter.value)) return "not identified";
   const Rounded shown = with_error(parameter.value, parameter.std_error);
   const std::string unit = pretty_unit(parameter.unit);
-  return shown.value + (shown.error == "–" ? "" : " ± " + shown.error) + (unit.empty() ? "" : " " + unit);
+  return shown.value + (shown.error == "–" ? "" : " ± " + shown.error) + (unit.empty() ? "" : " " + unit) +
+         (parameter.reason.empty() ? "" : " (" + parameter.reason + ")");
 }
 
 }  // namespace isac::report
