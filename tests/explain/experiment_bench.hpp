@@ -40,7 +40,8 @@ struct Bench {
         library(explain::make_library(data)),
         predictor(data) {
     // Of a low-passed row: 0.3 N in both sensors at 19 mm, and 0.004 kg/cm2, through a Gaussian of 6 ms at 500 Hz.
-    weights = {{0.0025, 120, 120, 0.005}};
+    constexpr double kSigma[] = {0.0025, 120, 120, 0.005};
+    std::copy(std::begin(kSigma), std::end(kSigma), weights.sigma);
     stem = explain::fit_baseline(predictor, library.tolerances, weights);
   }
 

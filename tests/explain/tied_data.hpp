@@ -22,14 +22,15 @@ struct TiedRig {
   double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
   double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 120;  // N at p0: both muscles stay taut
   double pretension = 0;  // N at no pressure; without it a force's gain says what an asymmetry says
-  double dry = 0, load_exponent = 0;       // N m, and its power of p_mean/p0
-  double offset = 0, asymmetry = 0;        // N m at p0 whatever the pressure, and in proportion to it
-  double dead_time = 0, second_lag = 0;    // s
-  double encoder_play = 0;                 // rad, half of it, between joint and encoder
-  double encoder_drift = 0;                // rad/s from eight o'clock on
-  double encoder_slip = 0, slip_at = 0;    // rad, s after eight o'clock
-  double leak[2] = {0, 0}, deadband = 0;   // 1/s of each muscle; Pa of a valve that does not answer less
-  double threshold = 0;                    // Pa that lift a bladder off
+  double dry = 0, load_exponent = 0;      // N m, and its power of p_mean/p0
+  double offset = 0, asymmetry = 0;       // N m at p0 whatever the pressure, and in proportion to it
+  double dead_time = 0, second_lag = 0;   // s
+  double encoder_play = 0;                // rad, half of it, between joint and encoder
+  double encoder_drift = 0;               // rad/s from eight o'clock on
+  double encoder_slip = 0, slip_at = 0;   // rad, s after eight o'clock
+  double leak[2] = {0, 0}, deadband = 0;  // 1/s of each muscle; Pa of a valve that does not answer less
+  double angle_damping = 0;  // N m s/rad3: a damping that grows with φ², which no catalogue has
+  double threshold = 0;      // Pa that lift a bladder off
   double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
   double known_inertia = 0;                // kg m2 that is believed; 0: the true one
   double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
@@ -103,7 +104,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     const auto pulling = [&](double pressure) { return std::max(0.0, pressure - rig.threshold); };
     const double dp = 0.5 * (pulling(p[1]) - pulling(p[0])), pm = 0.5 * (p[0] + p[1]);
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
-    return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w - rig.D * w -
+    return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w -
+           (rig.D + rig.angle_damping * angle * angle) * w -
            rig.dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset +
            rig.asymmetry * pm / rig.p0;
   };

@@ -30,7 +30,9 @@ constexpr double kConvention = 0.12;  // relative
 constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;  // of the linear gain
 constexpr double kSmallRemainder = 0.2;  // of the largest effect's size: less does not cast doubt on its name
-constexpr double kBeaten = 1.645;        // sigma, by functions without a name
+constexpr double kHardlyAnything =
+    0.01;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
+constexpr double kBeaten = 1.645;   // sigma, by functions without a name
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
@@ -296,7 +298,7 @@ class Search {
   /// effect is given the benefit of three sigma: that noise is a model.)
   void leave_to_slow_noise(Step& step) {
     if (step.trials.empty()) return;
-    const double units = std::max(0.0, units_closed(step.trials.front())), sigma = std::sqrt(units);
+    const double units = units_left(step), sigma = std::sqrt(std::max(0.0, units));
     const double best_of_many =
         std::min(1.0, static_cast<double>(step.screen.candidates.size()) * std::erfc(sigma / std::sqrt(2.0)));
     if (found_.added.empty() ? units >= kThreeSigma : best_of_many <= options_.significance) return;
@@ -307,6 +309,15 @@ class Search {
         "ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many", sigma);
     found_.notes.push_back({id, sentence});
     say(id + ": " + sentence);
+  }
+
+  /// What functions without a name close, by the noise's own model: an effect that no name is like is no noise for that.
+  double units_of_functions(const Step& step) const {
+    const GenericFit generic = fit_generic(place_, step.screen);
+    if (generic.functions.empty()) return 0;
+    const double unit =
+        compare(data_, generic.residual, place_.residual, 0, noise_density(data_, generic.residual)).unit;
+    return generic.gain / unit - 2.0 * kChoosingOne * static_cast<double>(generic.functions.size());
   }
 
   bool is_implausible(const Trial& t) {
@@ -333,7 +344,7 @@ class Search {
   }
 
   void forward() {
-    first_size_ = largest_size_ = 0;
+    first_size_ = largest_size_ = largest_units_ = 0;
     for (;;) {
       const bool narrow = !found_.added.empty() && !look_.contenders.empty();
       if (narrow) asked_for_ = look_.contenders;
@@ -362,7 +373,10 @@ class Search {
         take = size >= options_.material;
         if (take && !found_.added.empty()) take = is_clear_enough(size);
         if (take && found_.added.empty()) first_size_ = size;
-        if (take) largest_size_ = std::max(largest_size_, size);
+        if (take) {
+          largest_size_ = std::max(largest_size_, size);
+          largest_units_ = std::max(largest_units_, units_closed(step.trials.front()));
+        }
       }
       if (open && !take && found_.added.size() == 1 && a_rival_goes_better_with(step)) continue;
       found_.steps.push_back(std::move(step));
@@ -388,8 +402,14 @@ class Search {
 
   bool is_open(const Step& step) const {
     return step.gate.significant && step.gate.material &&
-           (found_.added.empty() || step.gate.size >= kSmallRemainder * largest_size_ ||
-            is_worth_a_second_name(step));
+           (found_.added.empty() ||
+            ((step.gate.size >= kSmallRemainder * largest_size_ || is_worth_a_second_name(step)) &&
+             units_left(step) >= kHardlyAnything * largest_units_));
+  }
+
+  /// What a name or functions without one can still close.
+  double units_left(const Step& step) const {
+    return std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
   }
 
   /// Beside a wrong share of the first, a second effect shows little until both are refitted.
@@ -655,6 +675,7 @@ class Search {
   double first_size_ = 0;  ///< of the first effect, over the floor
   double largest_size_ =
       0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
+  double largest_units_ = 0;  ///< of noise that one of them closed
   bool a_rival_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };

@@ -35,10 +35,10 @@ struct NoiseFilter;
 
 struct Weights {
   double sigma[kChains] = {1, 1, 1, 1};  ///< of one low-passed row, N m or Pa
-  Colour colour[kChains]{};
+  Colour colour[kChains];
   bool one_zero = false;  ///< of torque and motion: they are read by the same sensors
   std::shared_ptr<const NoiseFilter>
-      filter{};  ///< of these colours and the data that take() saw; any other is made when it is needed
+      filter;  ///< of these colours and the data that take() saw; any other is made when it is needed
 
   void take(const Prepared& data);
   [[nodiscard]] bool is_coloured() const noexcept;
