@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "isac/explain/generic_fit.hpp"
+#include "isac/explain/search_run.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kBeaten = 1.645;   // sigma, by functions without a name
+constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
+// Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
+constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
+
+}  // namespace
+
+void Search::hold_against_functions() {
+  const Around baseline = around(predictor_, found_.baseline, found_.weights);
+  const GenericFit generic = fit_generic(baseline, found_.steps.front().screen);
+  if (generic.functions.empty()) return;
+  std::string names;
+  int parameters = 0;
+  for (std::size_t i = 0; i < found_.added.size(); ++i) {
+    const Trial& named = found_.steps[i].trials.front();
+    names += (i > 0 ? " and " : "") + ranking_.id_of(named);
+    // Of those beyond the first, each was the best of many as well.
+    parameters += ranking_.parameters_of(named) + (i > 0 ? kChoosingOne : 0);
+  }
+  const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
+                                                        : baseline.project(found_.model.residual);
+  const Comparison behind = behind_generic(data_, left, parameters, generic);
+  if (generic.functions.size() < found_.added.size() && behind.separation < kTwinLimit)
+    found_.doubts.push_back(fmt::format(
+        "Together they do no more than one function without a name ({:.1f} sigma of data between them): it "
+        "may be one thing, and neither of them.",
+        behind.separation));
+  if (behind.t < kBeaten || behind.separation < kTwinLimit) {
+    say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
+                    names, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
+    return;
+  }
+  const std::string sentence =
+      fmt::format("ruled out: {:.1f} sigma behind functions that have no name", behind.t);
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    found_.notes.push_back({ranking_.id_of(found_.steps[i].trials.front()), sentence});
+  say(names + ": " + sentence);
+  found_.adequate = false;
+}
+
+void Search::look_at_remainder() {
+  if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
+  const double p = found_.steps.back().gate.p_value;
+  const Gatekeeper::Sized left =
+      gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
+  const bool pressure = (bit(left.chain) & kPressureChains) != 0;
+  if (p > kDoubtful || left.size < (pressure ? kWorthDoubtingOfPressure : kWorthDoubting) * first_size_)
+    return;
+  found_.doubts.push_back(
+      fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
+                  1 / p, left.size));
+  say(found_.doubts.back());
+}
+
+}  // namespace isac::explain

@@ -1,0 +1,127 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "isac/explain/gate.hpp"
+#include "isac/explain/search_run.hpp"
+
+namespace isac::explain {
+
+bool Search::another_leaves_nothing() {
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const Fit kept = found_.model;
+  const std::string first = ranking_.id_of(trials.front());
+  int tried = 0;
+  for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
+    if (!cannot_rule_out(trials[i].behind) && !nests(ranking_.id_of(trials[i]), first)) continue;
+    ++tried;
+    found_.added.back() = trials[i].hypothesis;
+    move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
+    const double large = kSmallRemainder * trials[i].material;
+    asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
+    const Step nameless = screened_step();
+    asked_for_.reset();
+    if (is_open_at_least(nameless, large)) continue;
+    Step rest = screened_step();
+    if (is_open_at_least(rest, large)) continue;
+    rest = refitted(std::move(rest));
+    if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
+    say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
+    put_first(i);
+    found_.steps.push_back(std::move(rest));
+    found_.adequate = true;
+    return true;
+  }
+  found_.added.back() = trials.front().hypothesis;
+  move_to(kept);
+  return false;
+}
+
+bool Search::a_rival_goes_better_with(const Step& step) {
+  if (a_rival_was_tried_ || step.trials.empty()) return false;
+  a_rival_was_tried_ = true;
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const Trial& second = step.trials.front();
+  const auto loss_of = [&](const Trial& first) { return with({first, second}).loss; };
+  double least = loss_of(trials.front()) - kThreeSigma * step.screen.noise_unit;
+  std::size_t best = 0, tried = 0;
+  for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
+    if (!cannot_rule_out(trials[i].behind) || ranking_.id_of(trials[i]) == ranking_.id_of(second)) continue;
+    ++tried;
+    const double loss = loss_of(trials[i]);
+    if (loss >= least) continue;
+    least = loss;
+    best = i;
+  }
+  if (best == 0) return false;
+  say(fmt::format("{} goes better with {} than {} does: it takes its place", ranking_.id_of(trials[best]),
+                  ranking_.id_of(second), ranking_.id_of(trials.front())));
+  put_first(best);
+  found_.added.back() = trials.front().hypothesis;
+  first_size_ = largest_size_ = trials.front().material;
+  move_to(with({trials.front()}));
+  return true;
+}
+
+void Search::put_first(std::size_t i) {
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const std::string first = ranking_.id_of(trials.front());
+  std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
+              trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  ranking_.mark(trials);
+  for (Trial& t : trials)
+    if (ranking_.id_of(t) == first) t.in_set = false;
+  Ranking::weigh(trials);
+}
+
+void Search::swap_and_drop() {
+  std::vector<Trial> chosen;
+  for (std::size_t i = 0; i < found_.added.size(); ++i) chosen.push_back(found_.steps[i].trials.front());
+  Step last = std::move(found_.steps.back());
+  std::vector<Step> steps;
+  bool changed = false;
+  asked_for_ = contenders();
+  for (std::size_t i = 0; i < chosen.size();) {
+    if (!changed && i + 1 == chosen.size()) {  // beside all before it: so it was added
+      steps.push_back(std::move(found_.steps[i]));
+      break;
+    }
+    std::vector<Trial> others = chosen;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    found_.added.clear();
+    for (const Trial& t : others) found_.added.push_back(t.hypothesis);
+    move_to(with(others));
+    Step step = step_here();
+    if (step.trials.empty()) {
+      say(fmt::format("{} is not missed when it is dropped", ranking_.id_of(chosen[i])));
+      chosen = others;
+      changed = true;
+      continue;
+    }
+    if (ranking_.id_of(step.trials.front()) != ranking_.id_of(chosen[i])) {
+      say(fmt::format("{} does better in place of {}", ranking_.id_of(step.trials.front()),
+                      ranking_.id_of(chosen[i])));
+      changed = true;
+    }
+    chosen[i] = step.trials.front();
+    step.screen = std::move(found_.steps[steps.size()].screen);  // of everything that was looked for
+    steps.push_back(std::move(step));
+    ++i;
+  }
+  asked_for_.reset();
+  found_.added.clear();
+  for (const Trial& t : chosen) found_.added.push_back(t.hypothesis);
+  move_to(with(chosen));
+  if (changed) {
+    last = step_here();
+    double largest = 0;
+    for (const Trial& t : chosen) largest = std::max(largest, t.material);
+    found_.adequate =
+        !(last.gate.significant && last.gate.material && last.gate.size >= kSmallRemainder * largest);
+  }
+  steps.push_back(std::move(last));
+  found_.steps = std::move(steps);
+}
+
+}  // namespace isac::explain

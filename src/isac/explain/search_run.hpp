@@ -1,0 +1,152 @@
+/// @file
+/// A search while it runs: what it has found so far, where it stands, and its phases, each in a file of its own.
+///
+///   search.cpp       one effect after another, and what is no effect but how a recorder counts
+///   search_step.cpp  one step: blocks and colour of the noise, screen, shortlist, joint refits, what is no finding
+///   rivals.cpp       what may take the place of an effect that was added, and what is not missed
+///   remainder.cpp    why a name may be none of the catalogue, though nothing significant is left
+///
+/// Of search.cpp only; everyone else calls search() (search.hpp).
+/// Units: sizes in noise floors, gains and losses in weighted squares, "units" of noise as compare() has them. Threads: one search is one
+/// thread's; its refits use options.threads. Errors: none. Source: docs/derivations/explain.md.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "isac/explain/plausible.hpp"
+#include "isac/explain/search.hpp"
+
+namespace isac::explain {
+
+class Search {
+ public:
+  Search(const Predictor& predictor, Library& library, Prepared& data, const ExplainOptions& options,
+         const Look& look)
+      : predictor_(predictor),
+        library_(library),
+        data_(data),
+        options_(options),
+        look_(look),
+        gate_(data, library, options.significance, options.material),
+        ranking_(data, library),
+        plausible_(data) {}
+
+  Found run();
+
+ private:
+  static constexpr double kLargeForSure =
+      25;  ///< units of noise, five sigma: whoever is so large and not found has too few blocks
+  static constexpr double kThreeSigma = 9;  ///< units of noise
+  static constexpr double kSmallRemainder =
+      0.2;  ///< of the largest effect's size: less does not cast doubt on its name
+  static constexpr double kSecondOfFirst = 0.35, kSecondOfFloor = 0.35;
+
+  // One effect after another: search.cpp.
+  void say(const std::string& line) const {
+    if (options_.progress) options_.progress(line);
+  }
+  bool touches_pressures() const;
+  void first_weights();
+  /// What stood anywhere near the top while effects were added: what may take the place of one of them.
+  std::set<std::string> contenders() const;
+  void report(const std::vector<Trial>& trials);
+  void forward();
+  bool is_open(const Step& step) const;
+  /// What a name or functions without one can still close.
+  double units_left(const Step& step) const {
+    return std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
+  }
+  /// Beside a wrong share of the first, a second effect shows little until both are refitted.
+  bool is_worth_a_second_name(const Step& step) const;
+  /// What is left over after a good name is small; a remainder that needs another name must be as clear as the first, or the first was
+  /// only like the truth.
+  bool is_clear_enough(double size) const {
+    return size >= std::max(kSecondOfFirst * first_size_, kSecondOfFloor);
+  }
+  /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
+  /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
+  bool is_convention(const Step& step);
+  /// Beside an effect, an offset of less than half a step is how the encoder is read.
+  bool is_within_a_step(const Step& step) const;
+  /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
+  /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.)
+  bool leave_half_a_step();
+
+  // One step: search_step.cpp.
+  void choose_blocks(const Eigen::VectorXd& residual);
+  ScreenOptions screen_options() const;
+  void move_to(const Fit& fit);
+  /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
+  void take_colour(const Eigen::VectorXd& left_over);
+  /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.
+  Weights noise_of_what_is_left() const;
+  /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
+  /// candidate leaves over. So is the yardstick of one that few blocks carry.
+  Screen screen_here();
+  Gate gate_of(const Screen& s, const std::set<std::string>& ignored = {}) const {
+    return gate_.judge(s, found_.weights, found_.floors, !found_.added.empty(), ignored);
+  }
+  std::vector<Screened> shortlist(const Screen& s) const;
+  /// The moment of a slip is not refined: those whose linear response does nearly as well are tried as well.
+  static void add_other_moments(const Screened& best, const Screen& s, std::vector<Screened>& list);
+  std::vector<Trial> refit_all(const std::vector<Screened>& list) const;
+  /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
+  bool is_open_at_least(const Step& step, double size) const;
+  Step screened_step();
+  Step step_here() { return refitted(screened_step()); }
+  Step refitted(Step step);
+  /// What blocks agree on may still be no more than the noise's own model makes of the best of so many, where that noise is slow. (A first
+  /// effect is given the benefit of three sigma: that noise is a model.)
+  void leave_to_slow_noise(Step& step);
+  /// What functions without a name close, by the noise's own model: an effect that no name is like is no noise for that.
+  double units_of_functions(const Step& step) const;
+  bool is_implausible(const Trial& t);
+  /// A response at a finite size that no size of the effect keeps: it was the curvature of noise.
+  bool is_empty_promise(const Trial& t, const Screen& s) const;
+  Active active_of(const Trial& t) const;
+  double units_closed(const Trial& t) const;
+  Fit with(const std::vector<Trial>& effects) const;
+
+  // What may take an effect's place: rivals.cpp.
+  /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
+  bool another_leaves_nothing();
+  /// The effect that stood first leaves too little for a second name and too much for none: one of its rivals, which fitted nearly as well
+  /// alone, may fit better with that second one, and leave it larger. It takes the place of the first.
+  bool a_rival_goes_better_with(const Step& step);
+  /// Of the first step's trials this one is taken; what stood first is ruled out.
+  void put_first(std::size_t i);
+  /// Each effect is given up once, with the others in place: another may do better, or nothing may be missed.
+  void swap_and_drop();
+
+  // What casts doubt on a name: remainder.cpp.
+  /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
+  void hold_against_functions();
+  /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
+  void look_at_remainder();
+
+  const Predictor& predictor_;
+  Library& library_;
+  Prepared& data_;
+  const ExplainOptions& options_;
+  const Look& look_;
+  Gatekeeper gate_;
+  Ranking ranking_;
+  Plausible plausible_;
+  Found found_;
+  Around place_;                                    ///< of found_.model
+  std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
+  Responses responses_;
+  double first_size_ = 0;  ///< of the first effect, over the floor
+  double largest_size_ =
+      0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
+  double largest_units_ = 0;  ///< of noise that one of them closed
+  bool a_rival_was_tried_ = false;
+  bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
+};
+
+}  // namespace isac::explain

@@ -1,0 +1,244 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <thread>
+
+#include "isac/explain/generic_fit.hpp"
+#include "isac/explain/search_run.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr std::size_t kShortlist = 9;
+constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
+constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
+constexpr double kMinimumBlocks = 24;
+constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
+constexpr double kKeptPromise = 0.1;  // of the linear gain
+
+}  // namespace
+
+void Search::choose_blocks(const Eigen::VectorXd& residual) {
+  const double tau = correlation_seconds(data_, residual);
+  double total = 0, longest = 0;
+  for (const PreparedRun& run : data_.runs)
+    if (!run.time.empty()) {
+      total += run.time.back();
+      longest = std::max(longest, run.time.back());
+    }
+  double seconds = std::clamp(6 * tau, kAtomSeconds, std::max(kAtomSeconds, longest / 3));
+  seconds = std::max(kAtomSeconds, std::min(seconds, total / kMinimumBlocks));
+  cut_blocks(data_, seconds);
+}
+
+ScreenOptions Search::screen_options() const {
+  return {.flips = 1999,
+          .significance = options_.significance,
+          .seed = options_.seed,
+          .threads = options_.threads,
+          .dictionary = true,
+          .only = asked_for_};
+}
+
+void Search::move_to(const Fit& fit) {
+  found_.model = fit;
+  place_ = around(predictor_, found_.model, found_.weights);
+}
+
+void Search::take_colour(const Eigen::VectorXd& left_over) {
+  take_colours(data_, beside_generic_functions(data_, left_over), found_.weights);
+  found_.wants_torque_of_free_runs = found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0 &&
+                                     can_add_torque_of_free_runs(data_);
+  responses_.forget();
+  found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+  move_to(found_.baseline);
+}
+
+Weights Search::noise_of_what_is_left() const {
+  Weights left = found_.weights;
+  if (!found_.adequate) return left;
+  const Eigen::VectorXd plain = unfiltered(data_, found_.weights, found_.model.residual);
+  for (int c = 0; c < kChains; ++c)
+    if (data_.has(static_cast<Chain>(c))) left.colour[c] = colour_of(data_, plain, static_cast<Chain>(c));
+  return left;
+}
+
+Screen Search::screen_here() {
+  choose_blocks(place_.residual);
+  Screen s = screen(place_, library_, screen_options(), &responses_);
+  if (s.candidates.empty() || s.candidates.front().gain <= 0) return s;
+  const Screened first = s.candidates.front();
+  const double before = data_.block_seconds;
+  const std::vector<Trial> best = refit_all({first});
+  choose_blocks(best.front().residual);
+  if (data_.block_seconds > before) cut_blocks(data_, before);
+  const bool large_and_not_found = !is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit;
+  if (large_and_not_found && found_.added.empty() && !colour_beside_best_) {
+    // Too little is left of it in the other blocks, or the noise was taken for as slow as the effect is.
+    colour_beside_best_ = true;
+    take_colour(unfiltered(data_, found_.weights, best.front().residual));
+    return found_.wants_torque_of_free_runs ? s : screen_here();
+  }
+  if (large_and_not_found) {
+    judge(s, data_, library_, screen_options(),
+          yardstick_beside(s, data_, responses_, first.hypothesis, best.front().residual));
+  } else if (data_.block_seconds < before) {
+    judge(s, data_, library_, screen_options());
+  }
+  return s;
+}
+
+std::vector<Screened> Search::shortlist(const Screen& s) const {
+  std::vector<Screened> list;
+  std::map<std::string, int> per_id;
+  std::optional<Screened> slip;
+  if (s.candidates.empty()) return list;
+  const double best = s.candidates.front().gain;
+  for (const Screened& c : s.candidates) {
+    if (c.gain <= 0) break;
+    if (list.size() >= kShortlist) break;
+    if (!is_significant(c, s) && c.gain < 0.5 * best) continue;
+    if (c.gain < kWorthRefitting * best && c.gain < kWorthRefittingUnits * s.noise_unit) break;
+    if (c.gain < 0.15 * best && list.size() >= 4) break;
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
+    if (std::any_of(found_.added.begin(), found_.added.end(),
+                    [&](int a) { return library_.hypotheses[static_cast<std::size_t>(a)].id() == h.id(); }))
+      continue;
+    if (++per_id[h.id()] > 3) continue;
+    list.push_back(c);
+    if (h.id() == "encoder_slip") slip = c;
+  }
+  if (slip) add_other_moments(*slip, s, list);
+  return list;
+}
+
+void Search::add_other_moments(const Screened& best, const Screen& s, std::vector<Screened>& list) {
+  constexpr double kNearlyAsWell = 0.6;  // of the gain
+  for (const Screened& other : s.shapes)
+    if (other.hypothesis == best.hypothesis && other.shape != best.shape &&
+        other.gain > kNearlyAsWell * best.gain)
+      list.push_back(other);
+}
+
+std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
+  std::vector<Trial> trials(list.size());
+  std::atomic<std::size_t> next{0};
+  const auto work = [&] {
+    for (std::size_t i = next++; i < list.size(); i = next++) {
+      const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
+      Refined refined = refine(place_, h, list[i].start);
+      // Where the linear start was a bad one, the shape's own values are another.
+      if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
+        Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
+        if (other.loss < refined.loss) refined = std::move(other);
+      }
+      trials[i].hypothesis = list[i].hypothesis;
+      trials[i].values = refined.values;
+      trials[i].residual = std::move(refined.residual);
+      trials[i].loss = refined.loss;
+      trials[i].material =
+          size_over_floor(data_, found_.weights, found_.floors, trials[i].residual - place_.residual);
+    }
+  };
+  std::vector<std::thread> pool;
+  for (int t = 1; t < options_.threads; ++t) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+  return trials;
+}
+
+bool Search::is_open_at_least(const Step& step, double size) const {
+  std::set<std::string> every;
+  for (const Hypothesis& h : library_.hypotheses) every.insert(h.id());
+  const Gate nameless = gate_of(step.screen, every);
+  return step.gate.significant && nameless.dense_size >= std::max(options_.material, size);
+}
+
+Step Search::screened_step() {
+  Step step;
+  step.screen = screen_here();
+  step.gate = gate_of(step.screen);
+  return step;
+}
+
+Step Search::refitted(Step step) {
+  const double least =
+      std::max(options_.material, found_.added.empty() ? 0.0 : kSmallRemainder * largest_size_);
+  if (!step.gate.significant || step.gate.size < kWorthALook * least) return step;
+  step.trials = refit_all(shortlist(step.screen));
+  std::set<std::string> ignored;
+  std::erase_if(step.trials, [&](const Trial& t) {
+    const bool wrong = is_implausible(t) || is_empty_promise(t, step.screen);
+    if (wrong) ignored.insert(ranking_.id_of(t));
+    return wrong;
+  });
+  if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
+  ranking_.rank(step.trials, place_.residual);
+  // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
+  const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
+  step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
+  leave_to_slow_noise(step);
+  return step;
+}
+
+void Search::leave_to_slow_noise(Step& step) {
+  if (step.trials.empty()) return;
+  const double units = units_left(step), sigma = std::sqrt(std::max(0.0, units));
+  const double best_of_many =
+      std::min(1.0, static_cast<double>(step.screen.candidates.size()) * std::erfc(sigma / std::sqrt(2.0)));
+  if (found_.added.empty() ? units >= kThreeSigma : best_of_many <= options_.significance) return;
+  step.gate.significant = false;
+  step.gate.p_value = std::max(step.gate.p_value, best_of_many);
+  const std::string id = ranking_.id_of(step.trials.front());
+  const std::string sentence = fmt::format(
+      "ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many", sigma);
+  found_.notes.push_back({id, sentence});
+  say(id + ": " + sentence);
+}
+
+double Search::units_of_functions(const Step& step) const {
+  const GenericFit generic = fit_generic(place_, step.screen);
+  if (generic.functions.empty()) return 0;
+  const double unit =
+      compare(data_, generic.residual, place_.residual, 0, noise_density(data_, generic.residual)).unit;
+  return generic.gain / unit - 2.0 * kChoosingOne * static_cast<double>(generic.functions.size());
+}
+
+bool Search::is_implausible(const Trial& t) {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  const std::string objection = plausible_.objection(h, t.values);
+  if (objection.empty()) return false;
+  found_.notes.push_back({h.id(), "ruled out: " + objection});
+  say(h.id() + ": ruled out: " + objection);
+  return true;
+}
+
+bool Search::is_empty_promise(const Trial& t, const Screen& s) const {
+  for (const Screened& c : s.candidates)
+    if (c.hypothesis == t.hypothesis) return place_.residual.squaredNorm() - t.loss < kKeptPromise * c.gain;
+  return false;
+}
+
+Active Search::active_of(const Trial& t) const {
+  Active a;
+  a.hypothesis = &library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  a.values = t.values;
+  return a;
+}
+
+double Search::units_closed(const Trial& t) const {
+  return (place_.residual.squaredNorm() - t.loss) /
+         compare(data_, t.residual, place_.residual, 0, noise_density(data_, t.residual)).unit;
+}
+
+Fit Search::with(const std::vector<Trial>& effects) const {
+  std::vector<Active> active;
+  for (const Trial& t : effects) active.push_back(active_of(t));
+  return active.empty() ? found_.baseline : refit(predictor_, found_.baseline, active, found_.weights, 6);
+}
+
+}  // namespace isac::explain
