@@ -4,7 +4,7 @@
 ///   refuted     rms_after > 1.002 rms_before on held-out runs (or 1.01 of the search's own baseline), and neither
 ///                 t ≥ 3 in rows freed of the noise's slow part, nor
 ///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides
-///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (search.cpp)
+///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (remainder.cpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too
 ///
 /// t: compare.hpp's, of the user's baseline behind the named model. Units: the answer's. Threads: pure. Errors: none.
