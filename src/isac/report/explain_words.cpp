@@ -104,7 +104,7 @@ std::string gap_sentence(const Explanation& e) {
   // The floor is known to some per cent: beyond all, or below nothing, is its error.
   if (std::isfinite(gap.share_closed) && !e.effects.empty())
     text += ", so " +
-            (gap.share_closed >= 0.995  ? "all"
+            (gap.share_closed > 1       ? "all"
              : gap.share_closed < 0.005 ? "none"
                                         : percent(gap.share_closed)) +
             " of what can be explained is closed";
