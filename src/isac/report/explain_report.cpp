@@ -93,7 +93,7 @@ void add_answer(Document& page, const Explanation& e) {
   if (added) {
     cards.push_back({"Gap after", amount(after, gap.unit), where});
     if (std::isfinite(gap.share_closed))
-      cards.push_back({"Closed", percent(gap.share_closed), "of what can be explained"});
+      cards.push_back({"Closed", share_closed_in_words(gap.share_closed), "of what can be explained"});
   }
   cards.push_back({"Noise floor", amount(gap.noise_floor, gap.unit), "what does not repeat"});
   if (std::isfinite(gap.heldout_zero_model))

@@ -101,14 +101,13 @@ std::string gap_sentence(const Explanation& e) {
     text += "; the noise's slow part decides which is larger: freed of it, " +
             with_unit(gap.freed_before, gap.unit) + " before and " + with_unit(gap.freed_after, gap.unit) +
             " after";
-  // The floor is known to some per cent: beyond all, or below nothing, is its error.
   if (std::isfinite(gap.share_closed) && !e.effects.empty())
-    text += ", so " +
-            (gap.share_closed > 1       ? "all"
-             : gap.share_closed < 0.005 ? "none"
-                                        : percent(gap.share_closed)) +
-            " of what can be explained is closed";
+    text += ", so " + share_closed_in_words(gap.share_closed) + " of what can be explained is closed";
   return text + ".";
+}
+
+std::string share_closed_in_words(double share) {
+  return share > 1 ? "all" : share < 0.005 ? "none" : percent(share);
 }
 
 std::string region_sentence(const explain::Region& region) {

@@ -16,6 +16,8 @@ namespace isac::report {
 [[nodiscard]] std::string verdict_sentence(const explain::Explanation& e);
 /// How far simulation and measurement are apart, before and after, beside the noise floor; empty if nothing is known.
 [[nodiscard]] std::string gap_sentence(const explain::Explanation& e);
+/// "83 %", or "all" and "none": the floor is known to some per cent, and what lies beyond is its error.
+[[nodiscard]] std::string share_closed_in_words(double share);
 [[nodiscard]] std::string region_sentence(const explain::Region& region);
 /// "T_c = 0.301 ± 0.012 N m, v_s = …".
 [[nodiscard]] std::string parameters_in_words(const explain::Candidate& candidate);
