@@ -6,7 +6,7 @@
 ///   rivals.cpp       what may take the place of an effect that was added, and what is not missed
 ///   remainder.cpp    why a name may be none of the catalogue, though nothing significant is left
 ///
-/// Of search.cpp only; everyone else calls search() (search.hpp).
+/// For these four files only; everyone else calls search() (search.hpp).
 /// Units: sizes in noise floors, gains and losses in weighted squares, "units" of noise as compare() has them. Threads: one search is one
 /// thread's; its refits use options.threads. Errors: none. Source: docs/derivations/explain.md.
 #pragma once
