@@ -231,7 +231,7 @@ Stroke stroke(double start, double seconds) {
     pushed += 1e-4 / 0.03 * (wanted - pushed);  // a hand does not jump in acceleration
     velocity += 1e-4 / 0.03 * (pushed - velocity);
     angle += 1e-4 * velocity;
-    if (s.angle.size() * 0.002 > t + 5e-5) continue;
+    if (static_cast<double>(s.angle.size()) * 0.002 > t + 5e-5) continue;
     s.angle.push_back(step * (std::floor(angle / step) + 0.5));
     s.velocity.push_back(velocity);
   }

@@ -259,7 +259,7 @@ TEST(KeptResponses, serve_a_screen_beside_another_torque_as_well) {
               {}, 2.0);
   const Library library = make_library(data);
   const Predictor predictor(data);
-  const Weights weights{{0.0025, 120, 120, 0.005}};
+  const Weights weights{{0.0025, 120, 120, 0.005}, {}, false, {}};
   const Fit stem = fit_baseline(predictor, library.tolerances, weights);
   Active friction;
   for (const Hypothesis& h : library.hypotheses)

@@ -39,6 +39,15 @@ TEST(Answer, is_written_with_the_keys_of_the_contract_in_their_order) {
       R"("warnings":[{"code":"few_rows","text":"Only 3 rows."}]})");
 }
 
+TEST(Answer, gives_a_reason_only_beside_what_is_not_identifiable) {
+  Answer answer = example();
+  answer.parameters[0].reason = "these runs do not tell it";
+  const std::string text = format_answer(answer);
+  EXPECT_NE(text.find(R"("identifiable":true,"remark":"these runs do not tell it")"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find(R"("identifiable":false,"reason":"Sweep)"), std::string::npos) << text;
+}
+
 TEST(Answer, numbers_read_back_to_the_same_double) {
   Answer answer = example();
   for (const double value : {0.1, 1.0 / 3, 1e-300, 1.7976931348623157e308, -23449.999999999996}) {

@@ -19,7 +19,8 @@ struct Estimated {
   double ci_low = std::numeric_limits<double>::quiet_NaN();   ///< 95 % interval
   double ci_high = std::numeric_limits<double>::quiet_NaN();  ///< 95 % interval
   bool identifiable = true;  ///< false: the data cannot tell; value is NaN and `reason` says what to record
-  std::string reason;        ///< one sentence when not identifiable, else empty
+  /// When not identifiable one sentence; of a value that stands without an error, why; else empty.
+  std::string reason;
 };
 
 /// A remark a person must see: `code` is stable for programs, `text` one plain sentence with the mend.

@@ -14,7 +14,7 @@ namespace isac::explain {
 namespace {
 
 constexpr double kNoneOfThem =
-    0.2;  // of the belief, where a name leaves over what chance seldom does: explain.md
+    0.25;  // of the belief, where a name leaves over what chance seldom does: explain.md
 
 /// A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what anyone
 /// would have fitted.

@@ -18,7 +18,7 @@
 namespace isac::explain {
 
 /// Belief in all names of a set together. What is missing may be none of the catalogue though one of it fits: 2 of 214 single names on blind
-/// datasets, clear and faint, were wrong (docs/explain.md).
+/// datasets, clear and faint, were wrong (docs/explain.md); effects from outside the catalogue are not counted there.
 inline constexpr double kSurest = 0.99;
 /// What stands first in a set is so much likelier than the noise alone would have it: with the same two or three names in the set, the first was
 /// right in 23 of 35 blind datasets, where the noise alone had said 15.

@@ -136,7 +136,7 @@ bool Search::is_open(const Step& step) const {
   return step.gate.significant && step.gate.material &&
          (found_.added.empty() ||
           ((step.gate.size >= kSmallRemainder * largest_size_ || is_worth_a_second_name(step)) &&
-           units_left(step) >= kHardlyAnything * largest_units_));
+           step.units >= kHardlyAnything * largest_units_));
 }
 
 bool Search::is_worth_a_second_name(const Step& step) const {

@@ -23,6 +23,8 @@ struct Step {
   std::vector<Trial> trials;  ///< best first
   Screen screen;
   Gate gate;
+  double units =
+      0;  ///< of noise that the best of them, or functions without a name, close; 0 where nothing was refitted
 };
 
 struct Found {

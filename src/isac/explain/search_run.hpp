@@ -57,10 +57,6 @@ class Search {
   void report(const std::vector<Trial>& trials);
   void forward();
   bool is_open(const Step& step) const;
-  /// What a name or functions without one can still close.
-  double units_left(const Step& step) const {
-    return std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
-  }
   /// Beside a wrong share of the first, a second effect shows little until both are refitted.
   bool is_worth_a_second_name(const Step& step) const;
   /// What is left over after a good name is small; a remainder that needs another name must be as clear as the first, or the first was

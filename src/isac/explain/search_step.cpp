@@ -181,21 +181,23 @@ Step Search::refitted(Step step) {
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
   const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
   step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
+  step.units =
+      std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
   leave_to_slow_noise(step);
   return step;
 }
 
 void Search::leave_to_slow_noise(Step& step) {
   if (step.trials.empty()) return;
-  const double units = units_left(step), sigma = std::sqrt(std::max(0.0, units));
-  const double best_of_many =
-      std::min(1.0, static_cast<double>(step.screen.candidates.size()) * std::erfc(sigma / std::sqrt(2.0)));
-  if (found_.added.empty() ? units >= kThreeSigma : best_of_many <= options_.significance) return;
+  const double best_of_many = std::min(1.0, static_cast<double>(step.screen.candidates.size()) *
+                                                std::erfc(std::sqrt(0.5 * std::max(0.0, step.units))));
+  if (found_.added.empty() ? step.units >= kThreeSigma : best_of_many <= options_.significance) return;
   step.gate.significant = false;
   step.gate.p_value = std::max(step.gate.p_value, best_of_many);
   const std::string id = ranking_.id_of(step.trials.front());
-  const std::string sentence = fmt::format(
-      "ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many", sigma);
+  const std::string sentence =
+      fmt::format("ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many",
+                  std::sqrt(std::max(0.0, units_closed(step.trials.front()))));
   found_.notes.push_back({id, sentence});
   say(id + ": " + sentence);
 }

@@ -26,7 +26,7 @@ Json parameter(const Estimated& estimate) {
   out["std_error"] = number(estimate.std_error);
   out["ci95"] = {number(estimate.ci_low), number(estimate.ci_high)};
   out["identifiable"] = estimate.identifiable;
-  if (!estimate.reason.empty()) out["reason"] = estimate.reason;
+  if (!estimate.reason.empty()) out[estimate.identifiable ? "remark" : "reason"] = estimate.reason;
   return out;
 }
 

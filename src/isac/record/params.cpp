@@ -37,7 +37,7 @@ Estimated read_estimate(const std::string& name, const toml::node& node, const s
             "parameter '" + name + "' is " + shown(node) + "; write it like { value = 1.5, unit = \"N m\" }");
   }
   const TomlSection section(*table, "parameters." + name, file,
-                            {"value", "unit", "std_error", "ci95", "identifiable", "reason"});
+                            {"value", "unit", "std_error", "ci95", "identifiable", "reason", "remark"});
   Estimated estimate;
   estimate.name = name;
   const auto value = section.number("value");
@@ -57,7 +57,7 @@ Estimated read_estimate(const std::string& name, const toml::node& node, const s
   }
   read_pair(section, "ci95", file, estimate.ci_low, estimate.ci_high);
   estimate.identifiable = section.boolean("identifiable").value_or(true);
-  estimate.reason = section.text("reason").value_or("");
+  estimate.reason = section.text("reason").value_or(section.text("remark").value_or(""));
   return estimate;
 }
 
@@ -147,7 +147,8 @@ std::string estimate_text(const Estimated& value) {
                     ", unit = " + toml_string(value.unit) + ", std_error = " + exact_number(value.std_error) +
                     ", ci95 = " + pair_text(value.ci_low, value.ci_high) +
                     ", identifiable = " + (value.identifiable ? "true" : "false");
-  if (!value.reason.empty()) out += ", reason = " + toml_string(value.reason);
+  if (!value.reason.empty())
+    out += (value.identifiable ? ", remark = " : ", reason = ") + toml_string(value.reason);
   return out + " }\n";
 }
 

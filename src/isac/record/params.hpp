@@ -6,7 +6,7 @@
 /// back gives the same bits. Sections: `[[joint]]` (one per joint), `[pcu]`, `[gains]`, `[masses]`, `[[effects]]`; sections
 /// this program does not know are kept and written back with the same values (their comments and order are not kept).
 ///
-/// In the file: `parameters.<name> = { value, unit, std_error, ci95 = [low, high], identifiable, reason }`; the box is
+/// In the file: `parameters.<name> = { value, unit, std_error, ci95 = [low, high], identifiable, reason or remark }`; the box is
 /// `box = { delta_pressure_Pa = [low, high], angle_rad = […], speed_rad_s = […] }`; `constants` carry their SI unit in the name.
 /// An unknown number is `nan`. Any other section with `parameters` is read as a ParamsSection too.
 /// Threads: pure functions but update_params, which one process at a time may call on one file.

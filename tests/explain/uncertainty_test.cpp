@@ -1,0 +1,90 @@
+// What is said of a parameter that the rows cannot tell, and that it takes nothing from the others.
+#include "isac/explain/uncertainty.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "isac/explain/explain.hpp"
+#include "isac/explain/fit.hpp"
+#include "tied_data.hpp"
+
+namespace isac::explain {
+namespace {
+
+struct Day {
+  Prepared data;
+  Library library;
+  Predictor predictor;
+  Weights weights;
+  Fit baseline;
+  Day(const test::TiedRig& rig, std::uint32_t first)
+      : data(prepare(test::record_all(rig,
+                                      {test::clamped(20, 0.1, 1.2, 6), test::by_hand(20, 0.5, 1.5),
+                                       test::free_in_steps(16, 4, 0.8)},
+                                      first),
+                     rig.facts(), {}, 2.0)),
+        library(make_library(data)),
+        predictor(data) {
+    weights.sigma[0] = weights.sigma[3] = 0.003;
+    weights.sigma[1] = weights.sigma[2] = 150;
+    baseline = fit_baseline(predictor, library.tolerances, weights);
+  }
+  [[nodiscard]] const Hypothesis& hypothesis(std::string_view id) const {
+    for (const Hypothesis& h : library.hypotheses)
+      if (h.info().id == id) return h;
+    throw std::out_of_range(std::string(id));
+  }
+  [[nodiscard]] Uncertain beside(const Hypothesis& h, const Values& start, Values* found = nullptr) const {
+    const Fit fit = refit(predictor, baseline, {{&h, start}}, weights, 12);
+    if (found != nullptr) *found = fit.model.effects.back().values;
+    return uncertainties(predictor, fit, weights);
+  }
+};
+
+double error_of(const std::vector<Estimated>& parameters, const std::string& name) {
+  for (const Estimated& e : parameters)
+    if (e.name == name) return e.std_error;
+  return kNotKnown;
+}
+
+TEST(Uncertainty, of_a_leak_is_as_if_the_muscle_that_would_rather_gain_air_were_not_asked) {
+  test::TiedRig rig;
+  rig.leak[1] = 0.012;
+  Values found{};
+  for (std::uint32_t first = 100; first < 130; first += 10) {
+    const Day day(rig, first);
+    const Hypothesis& both = day.hypothesis("leak_per_muscle");
+    const Uncertain with = day.beside(both, {0.001, 0.01}, &found);
+    if (found[0] != 0) continue;  // the noise let it leak a little
+    Hypothesis one = both;
+    one.free[0] = false;
+    const Uncertain without = day.beside(one, {0.0, 0.01});
+    EXPECT_EQ(with.effects[0][0].value, 0);
+    EXPECT_TRUE(std::isnan(with.effects[0][0].std_error) && std::isnan(with.effects[0][0].ci_low));
+    EXPECT_EQ(with.effects[0][0].reason, "at the end of its range");
+    EXPECT_EQ(with.effects[0][1].reason, "");
+    EXPECT_NEAR(with.effects[0][1].std_error / without.effects[0][1].std_error, 1, 0.02);
+    for (const char* name : {"K_C", "T_C"})
+      EXPECT_NEAR(error_of(with.base, name) / error_of(without.base, name), 1, 0.02) << name;
+    return;
+  }
+  FAIL() << "on no day did the tight muscle stand at its bound";
+}
+
+TEST(Uncertainty, of_a_stop_that_no_run_reached_is_told_as_such_and_its_place_is_kept) {
+  const Day day(test::TiedRig{}, 100);
+  const Uncertain u = day.beside(day.hypothesis("end_stop"), {1.0, 2.5, -0.3});
+  EXPECT_EQ(u.effects[0][1].name, "phi_high");
+  EXPECT_EQ(u.effects[0][1].value, 2.5);
+  EXPECT_TRUE(std::isnan(u.effects[0][1].std_error));
+  EXPECT_EQ(u.effects[0][1].reason, "these runs do not tell it");
+}
+
+}  // namespace
+}  // namespace isac::explain
