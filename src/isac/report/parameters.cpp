@@ -17,7 +17,7 @@ void add_parameters(Document& page, std::span<const Estimated> parameters, const
                           {"Relative error (%)", true}},
               .rows = {},
               .emphasised = {}};
-  std::vector<std::string> refused;
+  std::vector<std::string> refused, without_error;
   for (const Estimated& parameter : parameters) {
     if (!parameter.identifiable) {
       table.emphasised.push_back(table.rows.size());
@@ -26,7 +26,7 @@ void add_parameters(Document& page, std::span<const Estimated> parameters, const
       refused.push_back(parameter.name + ": " + parameter.reason);
       continue;
     }
-    if (!parameter.reason.empty()) refused.push_back(parameter.name + ": " + parameter.reason);
+    if (!parameter.reason.empty()) without_error.push_back(parameter.name + ": " + parameter.reason);
     const Rounded shown = with_error(parameter.value, parameter.std_error);
     const double relative = 100 * std::abs(parameter.std_error / parameter.value);
     table.rows.push_back({parameter.name, shown.value, shown.error,
@@ -37,6 +37,7 @@ void add_parameters(Document& page, std::span<const Estimated> parameters, const
   if (table.rows.empty()) return;
   page.table(table);
   page.box(BoxKind::kWarning, "Refused: the runs cannot tell", refused);
+  page.box(BoxKind::kNote, "Part of the model, without an error", without_error);
 }
 
 std::vector<std::string> warning_texts(const Warnings& warnings) {
