@@ -355,6 +355,22 @@ TEST(Explain, takes_no_effect_for_noise_because_no_name_is_like_it) {
       << e.summary;
 }
 
+TEST(Explain, gives_no_name_to_a_friction_that_comes_and_goes) {
+  const test::TiedRig rig{.dry = 0.06, .dry_share = 0.15};
+  const std::vector<PlannedRun> day = {test::by_hand(40, 0.5, 1.5), test::by_hand(40, 0.5, 2.5),
+                                       test::by_hand(40, 0.4, 1.0)};
+  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), test::by_hand(20, 0.3, 1.5)};
+  const Explanation e = explain(test::record_all(rig, day), HeldOut(test::record_all(rig, beyond, 40)),
+                                {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kUnknown) << e.summary;
+  EXPECT_TRUE(std::any_of(e.trials.begin(), e.trials.end(), [](const TrialNote& note) {
+    return note.sentence.find("not the same throughout") != std::string::npos;
+  })) << e.summary;
+  ASSERT_TRUE(e.unknown.has_value());
+  const std::vector<std::string>& on = e.unknown->depends_on;
+  EXPECT_EQ(std::count(on.begin(), on.end(), "velocity"), 1) << e.summary;
+}
+
 TEST(GenericFit, stands_beside_a_name_that_is_right_and_before_one_that_is_not) {
   const test::TiedRig rig{.dry = 0.03};
   Prepared data = prepare(test::record_all(rig, small_day()), rig.facts(), {}, 4.0);

@@ -22,7 +22,9 @@ struct TiedRig {
   double A = -23450, B = 174.2 / kPascalPerKgfCm2, C = 0.0026, D = 0.14, radius = 0.019, inertia = 0.0085;
   double p0 = 3 * kPascalPerKgfCm2, K_C = 1, T_C = 0.17, common = 120;  // N at p0: both muscles stay taut
   double pretension = 0;  // N at no pressure; without it a force's gain says what an asymmetry says
-  double dry = 0, load_exponent = 0;      // N m, and its power of p_mean/p0
+  double dry = 0, load_exponent = 0;  // N m, and its power of p_mean/p0
+  double dry_share = 1;               // of half seconds in which it is there at all, which no catalogue has
+  double bearing = 0, skew = 0;  // N m of friction that no force sensor sees; s that the angle is read late
   double offset = 0, asymmetry = 0;       // N m at p0 whatever the pressure, and in proportion to it
   double dead_time = 0, second_lag = 0;   // s
   double encoder_play = 0;                // rad, half of it, between joint and encoder
@@ -100,14 +102,16 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
   const double omega = hand ? run.peak_speed_rad_s / (run.amplitude_rad * steepest) : 0;
   double force[2] = {0, 0};
   double angle = middle, velocity = 0, shaft = middle, far_angle = middle, far_velocity = 0;
+  double dry = rig.dry;
+  std::vector<double> shafts;
+  const auto late = static_cast<std::size_t>(std::lround(rig.skew / kStep));
   const auto torque = [&](double w) {
     const auto pulling = [&](double pressure) { return std::max(0.0, pressure - rig.threshold); };
     const double dp = 0.5 * (pulling(p[1]) - pulling(p[0])), pm = 0.5 * (p[0] + p[1]);
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
     return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w -
            (rig.D + rig.angle_damping * angle * angle) * w -
-           rig.dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset +
-           rig.asymmetry * pm / rig.p0;
+           dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset + rig.asymmetry * pm / rig.p0;
   };
   series::Recording out;
   out.source = "run" + std::to_string(number) + ".csv";
@@ -132,7 +136,11 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
         velocity += run.amplitude_rad * share[i] * omega * tone[i] * std::cos(omega * tone[i] * t + phase[i]);
       }
     }
+    if (rig.dry_share < 1 && k % 5000 == 0)
+      dry = uniform(random) < 6.283185307179586 * rig.dry_share ? rig.dry : 0;
     shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
+    if (late > 0) shafts.push_back(shaft);
+    const double seen = late == 0 ? shaft : shafts[shafts.size() > late ? shafts.size() - 1 - late : 0];
     const double carried = torque(velocity),
                  both_pull = rig.pretension + rig.common * 0.5 * (p[0] + p[1]) / rig.p0;
     for (int i = 0; i < 2; ++i) {
@@ -148,7 +156,7 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
         return std::min(rig.force_most, force[i] + zeros + rig.force_noise * gauss(random));
       };
       const double row[8] = {t,
-                             encoder * std::round((shaft + rig.encoder_drift * (since_eight + t) +
+                             encoder * std::round((seen + rig.encoder_drift * (since_eight + t) +
                                                    (since_eight + t >= rig.slip_at ? rig.encoder_slip : 0)) /
                                                   encoder),
                              p[0] + rig.pressure_noise * gauss(random),
@@ -180,7 +188,10 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       far_angle += kStep * far_velocity;
     }
     if (free) {  // dry friction holds the joint where no torque overcomes it
-      const double push = torque(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
+      const auto driven = [&](double w) {
+        return torque(w) - (w > 0 ? rig.bearing : w < 0 ? -rig.bearing : 0.0);
+      };
+      const double push = driven(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
       const bool stuck = velocity == 0 && push * torque(0) <= 0;
       const double next = stuck ? 0 : velocity + kStep * (push - pulled) / near_inertia;
       velocity = velocity * next < 0 ? 0 : next;

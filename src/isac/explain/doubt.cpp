@@ -8,6 +8,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/raw_effects.hpp"
 #include "isac/explain/unknown.hpp"
 
 namespace isac::explain {
@@ -50,8 +51,8 @@ bool closes_little(const Gap& gap) {
   return open && gap.share_closed < kLittle;
 }
 
-bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user, const Proof& proof,
-                Chain chain, Gap& gap) {
+bool is_refuted(const Predictor& predictor, const Found& found, const ModelPoint& user, const Proof& proof,
+                Chain chain, const ExplainOptions& options, Gap& gap) {
   constexpr double kClearly = 3.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
   constexpr double kAbout = 1.01;                     // where they hardly show the effect, noise decides
   if (found.added.empty() || proof.runs() == 0) return false;
@@ -60,10 +61,13 @@ bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user
   const Proof::Freed freed = proof.freed(found.model.model, user, found.weights, chain);
   const Colour& colour = found.weights.colour[static_cast<int>(chain)];
   if ((colour.slow > 0 || colour.wander > 0) && freed.behind.t >= kClearly && freed.first < freed.second) {
-    free_of_slow_noise(data, found, freed, chain, gap);
+    free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;
   }
-  return worse && (gap.heldout_after > kAbout * gap.heldout_before || freed.behind.t < kHardly);
+  if (!worse || (gap.heldout_after <= kAbout * gap.heldout_before && freed.behind.t >= kHardly)) return false;
+  const ModelPoint &model = found.model.model, &own = found.baseline.model;
+  return proof.freed(model, own, found.weights, chain).behind.t < kClearly ||
+         !is_mended_by_raw_effects(predictor, found, proof, chain, options, gap);
 }
 
 void doubt(const Predictor& predictor, const Found& found, Explanation& e) {

@@ -3,7 +3,9 @@
 ///
 ///   refuted     rms_after > 1.002 rms_before on held-out runs (or 1.01 of the search's own baseline), and neither
 ///                 t ≥ 3 in rows freed of the noise's slow part, nor
-///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides
+///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides, nor
+///                 t ≥ 3 over the search's own baseline, where what only the recording's rate shows (raw_effects.hpp) then takes so much
+///                 more that rms_after ≤ rms_before: two things are missing, and one of them was not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (remainder.cpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too
 ///
@@ -22,8 +24,8 @@ namespace isac::explain {
 
 /// Is what was named refuted by runs that it has not seen? `user`: the baseline that anyone would have fitted. `gap` gains the freed numbers
 /// where they decide.
-[[nodiscard]] bool is_refuted(const Prepared& data, const Found& found, const ModelPoint& user,
-                              const Proof& proof, Chain chain, Gap& gap);
+[[nodiscard]] bool is_refuted(const Predictor& predictor, const Found& found, const ModelPoint& user,
+                              const Proof& proof, Chain chain, const ExplainOptions& options, Gap& gap);
 
 /// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
 void doubt(const Predictor& predictor, const Found& found, Explanation& e);

@@ -210,7 +210,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const ModelPoint plain = plain_baseline(predictor, found);
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
-  if (is_refuted(data, found, user, proof, chain, e.gap)) e.verdict = Verdict::kUnknown;
+  if (is_refuted(predictor, found, user, proof, chain, options, e.gap)) e.verdict = Verdict::kUnknown;
   if (e.verdict == Verdict::kUnknown) {
     leave_unnamed(predictor, found, e);
   } else if (!e.effects.empty() && (!found.doubts.empty() || closes_little(e.gap))) {

@@ -19,7 +19,8 @@ namespace {
 
 constexpr double kMainsLow = 45, kMainsHigh = 65;  // Hz, as the catalogue has it
 constexpr std::size_t kFewestSpikes = 5;
-constexpr double kLooks = 3;  // lines of torque, of motion, and spikes share the significance
+constexpr double kBesideNamed = 0.35;  // of the gap that the named effects closed
+constexpr double kLooks = 3;           // lines of torque, of motion, and spikes share the significance
 
 /// Mean square that something takes out of a residual; negative where it adds.
 using Taken = std::function<double(const std::vector<Series>&)>;
@@ -208,11 +209,15 @@ double less(double rms, double mean_square) {
 
 }  // namespace
 
-namespace {
-
-constexpr double kBesideNamed = 0.35;  // of the gap that the named effects closed
-
-}  // namespace
+bool is_mended_by_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof, Chain chain,
+                              const ExplainOptions& options, const Gap& gap) {
+  const double scale = label_of(predictor.data(), chain).scale;
+  double taken = 0;
+  for (const RawEffect& effect : look(predictor, found.model.model, options))
+    if (effect.chain == chain && effect.rms >= options.material * found.floors.white[static_cast<int>(chain)])
+      taken += effect.taken(proof.series(found.model.model, chain));
+  return less(gap.heldout_after, scale * scale * taken) <= gap.heldout_before;
+}
 
 void add_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof,
                      const ExplainOptions& options, Explanation& e) {

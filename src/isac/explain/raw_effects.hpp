@@ -15,6 +15,12 @@
 
 namespace isac::explain {
 
+/// Beside the named model, do they take so much from held-out rows of the chain that these are no worse than before? `gap`: of the named
+/// model alone.
+[[nodiscard]] bool is_mended_by_raw_effects(const Predictor& predictor, const Found& found,
+                                            const Proof& proof, Chain chain, const ExplainOptions& options,
+                                            const Gap& gap);
+
 void add_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof,
                      const ExplainOptions& options, Explanation& e);
 

@@ -2,13 +2,16 @@
 
 #include <cmath>
 
+#include "isac/explain/constancy.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/search_run.hpp"
 
 namespace isac::explain {
 namespace {
 
-constexpr double kBeaten = 1.645;   // sigma, by functions without a name
+constexpr double kBeaten = 1.645;                     // sigma, by functions without a name
+constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
+constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
@@ -46,6 +49,28 @@ void Search::hold_against_functions() {
     found_.notes.push_back({ranking_.id_of(found_.steps[i].trials.front()), sentence});
   say(names + ": " + sentence);
   found_.adequate = false;
+}
+
+void Search::hold_against_itself() {
+  const Around baseline = around(predictor_, found_.baseline, found_.weights);
+  const double closed = baseline.project(found_.model.residual - found_.baseline.residual).norm();
+  for (std::size_t i = 0; i < found_.added.size(); ++i) {
+    const std::size_t effect = found_.model.tolerances + i;
+    const std::string id = found_.model.model.effects[effect].hypothesis->id();
+    const Constancy size = constancy_of(baseline, found_.model, effect);
+    const double alone = share_of(baseline, found_.model, effect, -1).norm();
+    std::string why;
+    if (size.variation > kAsMuchAsItself && size.variation > kForSure * size.error)
+      why = fmt::format(
+          "its size is not the same throughout: from one second to the next it varies by {:.0f} % of itself",
+          100 * std::sqrt(size.variation));
+    else if (found_.added.size() > 1 && alone > kGiant * closed)
+      why = fmt::format("it is {:.0f} times what all of them close together: they cancel", alone / closed);
+    if (why.empty()) continue;
+    found_.notes.push_back({id, "ruled out: " + why});
+    say(id + ": ruled out: " + why);
+    found_.adequate = false;
+  }
 }
 
 void Search::look_at_remainder() {

@@ -12,6 +12,8 @@ bool Search::another_leaves_nothing() {
   std::vector<Trial>& trials = found_.steps.front().trials;
   const Fit kept = found_.model;
   const std::string first = ranking_.id_of(trials.front());
+  const double blocks = data_.block_seconds;
+  const std::size_t notes = found_.notes.size();
   int tried = 0;
   for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
     if (!cannot_rule_out(trials[i].behind) && !nests(ranking_.id_of(trials[i]), first)) continue;
@@ -34,6 +36,8 @@ bool Search::another_leaves_nothing() {
     return true;
   }
   found_.added.back() = trials.front().hypothesis;
+  found_.notes.resize(notes);  // what was tried beside a rival says nothing beside what stands first
+  cut_blocks(data_, blocks);
   move_to(kept);
   return false;
 }
@@ -43,23 +47,31 @@ bool Search::a_rival_goes_better_with(const Step& step) {
   a_rival_was_tried_ = true;
   std::vector<Trial>& trials = found_.steps.front().trials;
   const Trial& second = step.trials.front();
-  const auto loss_of = [&](const Trial& first) { return with({first, second}).loss; };
-  double least = loss_of(trials.front()) - kThreeSigma * step.screen.noise_unit;
+  const std::string first = ranking_.id_of(trials.front());
+  const double unit = step.screen.noise_unit;
+  const auto loss_of = [&](const Trial& t) {
+    return with({t, second}).loss + 2 * unit * ranking_.parameters_of(t);
+  };
+  const double standing = loss_of(trials.front());
+  double least = standing - kThreeSigma * unit;
   std::size_t best = 0, tried = 0;
   for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
-    if (!cannot_rule_out(trials[i].behind) || ranking_.id_of(trials[i]) == ranking_.id_of(second)) continue;
+    // A general case led its simple one because something else was missing: beside that, the simple one need only do as well.
+    const bool simpler = nests(first, ranking_.id_of(trials[i]));
+    if ((!cannot_rule_out(trials[i].behind) && !simpler) ||
+        ranking_.id_of(trials[i]) == ranking_.id_of(second))
+      continue;
     ++tried;
     const double loss = loss_of(trials[i]);
-    if (loss >= least) continue;
-    least = loss;
+    if (loss >= (simpler && best == 0 ? standing : least)) continue;
+    least = std::min(least, loss);
     best = i;
   }
   if (best == 0) return false;
   say(fmt::format("{} goes better with {} than {} does: it takes its place", ranking_.id_of(trials[best]),
-                  ranking_.id_of(second), ranking_.id_of(trials.front())));
+                  ranking_.id_of(second), first));
   put_first(best);
   found_.added.back() = trials.front().hypothesis;
-  first_size_ = largest_size_ = trials.front().material;
   move_to(with({trials.front()}));
   return true;
 }
@@ -73,6 +85,7 @@ void Search::put_first(std::size_t i) {
   for (Trial& t : trials)
     if (ranking_.id_of(t) == first) t.in_set = false;
   Ranking::weigh(trials);
+  first_size_ = largest_size_ = trials.front().material;
 }
 
 void Search::swap_and_drop() {
@@ -81,6 +94,7 @@ void Search::swap_and_drop() {
   Step last = std::move(found_.steps.back());
   std::vector<Step> steps;
   bool changed = false;
+  const double blocks = data_.block_seconds;
   asked_for_ = contenders();
   for (std::size_t i = 0; i < chosen.size();) {
     if (!changed && i + 1 == chosen.size()) {  // beside all before it: so it was added
@@ -93,7 +107,7 @@ void Search::swap_and_drop() {
     for (const Trial& t : others) found_.added.push_back(t.hypothesis);
     move_to(with(others));
     Step step = step_here();
-    if (step.trials.empty()) {
+    if (step.trials.empty() || !step.gate.significant) {
       say(fmt::format("{} is not missed when it is dropped", ranking_.id_of(chosen[i])));
       chosen = others;
       changed = true;
@@ -115,10 +129,15 @@ void Search::swap_and_drop() {
   move_to(with(chosen));
   if (changed) {
     last = step_here();
-    double largest = 0;
-    for (const Trial& t : chosen) largest = std::max(largest, t.material);
-    found_.adequate =
-        !(last.gate.significant && last.gate.material && last.gate.size >= kSmallRemainder * largest);
+    first_size_ = steps.front().trials.front().material;
+    largest_size_ = largest_units_ = 0;
+    for (const Step& step : steps) {
+      largest_size_ = std::max(largest_size_, step.trials.front().material);
+      largest_units_ = std::max(largest_units_, step.units);
+    }
+    found_.adequate = !is_open(last);
+  } else {
+    cut_blocks(data_, blocks);
   }
   steps.push_back(std::move(last));
   found_.steps = std::move(steps);

@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative
+constexpr double kMostByTolerance =
+    2;  // of what stands beyond it: less beyond than within is the tolerance's own error
 constexpr double kHardlyAnything =
     0.01;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
 
@@ -34,6 +36,7 @@ Found Search::run() {
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
   if (found_.added.size() > 1) swap_and_drop();
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
+  if (found_.adequate && !found_.added.empty()) hold_against_itself();
   look_at_remainder();
   if (found_.adequate) leave_half_a_step();
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
@@ -108,7 +111,7 @@ void Search::forward() {
     if (take) {
       const double size = step.trials.front().material;
       take = size >= options_.material;
-      if (take && !found_.added.empty()) take = is_clear_enough(size);
+      if (take && !found_.added.empty()) take = is_clear_enough(whole_size(step.trials.front()));
       if (take && found_.added.empty()) first_size_ = size;
       if (take) {
         largest_size_ = std::max(largest_size_, size);
@@ -134,13 +137,26 @@ void Search::forward() {
 
 bool Search::is_open(const Step& step) const {
   return step.gate.significant && step.gate.material &&
-         (found_.added.empty() ||
-          ((step.gate.size >= kSmallRemainder * largest_size_ || is_worth_a_second_name(step)) &&
+         (found_.added.empty() || is_worth_a_second_name(step) ||
+          (step.gate.size >= kSmallRemainder * largest_size_ &&
            step.units >= kHardlyAnything * largest_units_));
 }
 
+double Search::whole_size(const Trial& t) const {
+  for (std::size_t i = 0; i < found_.model.tolerances; ++i) {
+    const Active& tolerance = found_.model.model.effects[i];
+    const double within = tolerance.values[0];
+    if (tolerance.hypothesis->effect != active_of(t).hypothesis->effect || within == 0) continue;
+    const Fit fit = refit(predictor_, found_.model, {active_of(t)}, found_.weights, 6);
+    const double whole = fit.model.effects.back().values[0];
+    return whole / within > 1 ? t.material * std::min(whole / (whole - within), kMostByTolerance)
+                              : t.material;
+  }
+  return t.material;
+}
+
 bool Search::is_worth_a_second_name(const Step& step) const {
-  return !step.trials.empty() && is_clear_enough(step.trials.front().material) &&
+  return !step.trials.empty() && is_clear_enough(whole_size(step.trials.front())) &&
          units_closed(step.trials.front()) > kLargeForSure;
 }
 
@@ -193,8 +209,8 @@ bool Search::leave_half_a_step() {
                   [](const Hypothesis& h) { return h.id() == "encoder_offset" && h.upper[0] > 0; });
   if (an_offset || there || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return false;
   tolerate(library_, data_, "encoder_offset", -0.5 * data_.rig.angle_step, 0.5 * data_.rig.angle_step);
-  const Fit base = fit_baseline(predictor_, library_.tolerances, found_.weights);
-  move_to(refit(predictor_, base, effects, found_.weights, 8));
+  found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+  move_to(refit(predictor_, found_.baseline, effects, found_.weights, 8));
   return true;
 }
 

@@ -64,6 +64,8 @@ class Search {
   bool is_clear_enough(double size) const {
     return size >= std::max(kSecondOfFirst * first_size_, kSecondOfFloor);
   }
+  /// Of an effect that a tolerance took its share of, with that share.
+  double whole_size(const Trial& t) const;
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
   /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
   bool is_convention(const Step& step);
@@ -122,6 +124,8 @@ class Search {
   // What casts doubt on a name: remainder.cpp.
   /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
   void hold_against_functions();
+  /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
+  void hold_against_itself();
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
   void look_at_remainder();
 
