@@ -2,11 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <thread>
 
 #include "isac/explain/experiment_words.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -231,14 +230,7 @@ double Designer::smallest(const Information& gram, const std::vector<std::size_t
 
 std::vector<std::optional<Designer::Information>> Designer::all_candidates() const {
   std::vector<std::optional<Information>> grams(candidates_.size());
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < grams.size(); i = next++) grams[i] = information(candidates_[i]);
-  };
-  std::vector<std::thread> pool;
-  for (int t = 1; t < options_.threads; ++t) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
+  share_work(options_.threads, grams.size(), [&](std::size_t i) { grams[i] = information(candidates_[i]); });
   return grams;
 }
 

@@ -142,7 +142,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   Prepared data = prepare(runs, options.rig, options.baseline, 4.0, heldout.first_start());
   QuietPressure quiet = QuietPressure::learn(data);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
-  auto predictor_here = std::make_unique<Predictor>(data);
+  auto predictor_here = std::make_unique<Predictor>(data, options.threads);
   const Look first{.provisional = true, .contenders = {}};
   Found found = search(*predictor_here, *library_here, data, options, first);
   if (found.wants_torque_of_free_runs) {
@@ -150,7 +150,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       options.progress("the force sensors' zero wanders: free runs tell it beside their motion");
     add_torque_of_free_runs(data);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
-    predictor_here = std::make_unique<Predictor>(data);
+    predictor_here = std::make_unique<Predictor>(data, options.threads);
     found = search(*predictor_here, *library_here, data, options, first);
   }
   // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
@@ -160,7 +160,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     first_library = std::move(library_here);
     quiet = QuietPressure::learn(data, &valves);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
-    predictor_here = std::make_unique<Predictor>(data);
+    predictor_here = std::make_unique<Predictor>(data, options.threads);
     if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
     found = search(*predictor_here, *library_here, data, options,
                    {.provisional = false, .contenders = found.contenders});

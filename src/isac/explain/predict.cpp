@@ -6,12 +6,13 @@
 #include <string_view>
 
 #include "isac/explain/predict_parts.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 
 using models::Hook;
 
-Predictor::Predictor(const Prepared& data) : data_(&data) {
+Predictor::Predictor(const Prepared& data, int threads) : data_(&data), threads_(threads) {
   static std::atomic<std::uint64_t> made{0};
   identity_ = ++made;
   const bool seed = data.baseline.terms.empty();
@@ -135,8 +136,8 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       if (!extra.empty()) extra = low_pass(extra, data_->smoothing.torque / run.interval);
       smooth = std::move(extra);
       smooth.resize(run.time.size());
-      std::vector<double> torque(smooth.size()), change(smooth.size(), 0.0);
-      for (std::size_t k = 0; k < torque.size(); ++k) torque[k] = base_torque(model, in, k) + smooth[k];
+      std::vector<double> torque = smooth, change(smooth.size(), 0.0);
+      add_base_torque(model, in, torque);
       read_forces(model, run, Reading::kSmooth, torque, change);
       for (std::size_t k = 0; k < change.size(); ++k) {
         smooth[k] += change[k];
@@ -242,7 +243,7 @@ double Predictor::stiffness(const ModelPoint& model) const noexcept {
 }
 
 void Predictor::predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const {
-  for (std::size_t r = 0; r < data_->runs.size(); ++r) predict_run(model, r, chains, out);
+  share_work(threads_, data_->runs.size(), [&](std::size_t r) { predict_run(model, r, chains, out); });
 }
 
 Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t index) const {
@@ -253,10 +254,10 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
   const bool reads = reads_force(model);
   if (run.has_torque && (run.has_pressure || !data_->baseline.terms.empty())) {
     const std::vector<double> extra = torque_of_effects(model, run, in, false);
-    rate.torque.resize(run.time.size());
-    const double resting = index < model.rest.size() ? model.rest[index] * stiffness(model) : 0.0;
-    for (std::size_t k = 0; k < rate.torque.size(); ++k)
-      rate.torque[k] = resting + base_torque(model, in, k) + (extra.empty() ? 0.0 : extra[k]);
+    rate.torque.assign(run.time.size(),
+                       index < model.rest.size() ? model.rest[index] * stiffness(model) : 0.0);
+    add_base_torque(model, in, rate.torque);
+    for (std::size_t k = 0; k < extra.size(); ++k) rate.torque[k] += extra[k];
     if (reads) {
       std::vector<double> change(rate.torque.size(), 0.0);
       read_forces(model, run, Reading::kSmooth, rate.torque, change);

@@ -41,7 +41,8 @@ struct ModelPoint {
 
 class Predictor {
  public:
-  explicit Predictor(const Prepared& data);
+  /// `threads`: that one prediction of all runs may use.
+  explicit Predictor(const Prepared& data, int threads = 1);
 
   [[nodiscard]] const std::vector<BaseParameter>& base() const noexcept { return base_; }
   [[nodiscard]] const Prepared& data() const noexcept { return *data_; }
@@ -75,7 +76,8 @@ class Predictor {
   std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                                         bool motion, std::size_t every = 1) const;
   std::size_t thinned(const Hypothesis& effect, double sigma) const noexcept;
-  double base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const;
+  /// Adds the baseline's own torque, at every sample.
+  void add_base_torque(const ModelPoint& model, const Inputs& in, std::vector<double>& sum) const;
   void pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
                     std::vector<double> (&p)[2]) const;
   enum class Reading { kSmooth, kClipped };
@@ -83,6 +85,7 @@ class Predictor {
                    const std::vector<double>& torque, std::vector<double>& change) const;
 
   const Prepared* data_;
+  int threads_ = 1;
   std::uint64_t identity_ = 0;  ///< of this predictor among all, for what a thread keeps
   std::vector<BaseParameter> base_;
   std::vector<int> terms_;         ///< catalogue indices of the output's terms

@@ -19,13 +19,18 @@ namespace isac::explain {
   return null_values(*a.hypothesis, a.values) == a.values;
 }
 
-/// (e^s − 1)/s; where s is small, by its series to 1e-9.
-[[nodiscard]] inline double growth(double s) {
-  return std::abs(s) < 0.03 ? 1 + s * (0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120))) : std::expm1(s) / s;
-}
-/// (growth(s) − 1)/s: the same for an input that rises evenly over the step.
+/// (growth(s) − 1)/s: the growth for an input that rises evenly over the step; where s is small, by its series, Σ s^k/(k + 2)!, to 1e-11.
 [[nodiscard]] inline double growth_of_ramp(double s) {
-  return std::abs(s) < 0.03 ? 0.5 + s * (1.0 / 6 + s * (1.0 / 24 + s / 120)) : (growth(s) - 1) / s;
+  constexpr double kSmall = 0.4;
+  if (std::abs(s) >= kSmall) return ((std::expm1(s) / s) - 1) / s;
+  double sum = 1;
+  for (const double share : {1.0 / 10, 1.0 / 9, 1.0 / 8, 1.0 / 7, 1.0 / 6, 1.0 / 5, 1.0 / 4, 1.0 / 3})
+    sum = 1 + s * share * sum;
+  return 0.5 * sum;
+}
+/// (e^s − 1)/s.
+[[nodiscard]] inline double growth(double s) {
+  return 1 + s * growth_of_ramp(s);
 }
 
 /// Of the baseline, what effects that bend it need: A, B, C, D.
@@ -66,6 +71,8 @@ struct Predictor::Inputs {
   std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration,
       own_pressure[2];
   std::vector<double> columns;  ///< row-major: rows of the torque chain × terms
+  mutable std::vector<double>
+      terms;  ///< row-major: samples × terms, each with 1 for its parameter; empty until asked for
 };
 
 }  // namespace isac::explain

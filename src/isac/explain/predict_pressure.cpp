@@ -44,6 +44,10 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       arrived[i][static_cast<std::size_t>(k)] = (1 - part) * newer + part * older;
     }
   }
+  std::size_t up_to_last_state = effects.size();  // what comes after it moves no state
+  while (up_to_last_state > 0 && effects[up_to_last_state - 1].active->hypothesis->info().state_count == 0)
+    --up_to_last_state;
+  constexpr double kNudge = 1.0;  // Pa
   const double rate = 1 / lag;
   models::ValvePoint<double> x;
   x.lag = lag;
@@ -63,25 +67,23 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       models::effect_pressure_rate(e.active->hypothesis->effect, e.active->values.data(), x, e.z, v);
     if (!(move > 0)) return;
     double again[2] = {gain * u0[0], gain * u0[1]};
-    for (Placed& e : effects) {
+    for (std::size_t j = 0; j < up_to_last_state; ++j) {
+      Placed& e = effects[j];
       x.command[0] = again[0];
       x.command[1] = again[1];
-      double f[2] = {}, g[2] = {};
       const int effect = e.active->hypothesis->effect;
       const double* q = e.active->values.data();
       const int count = e.active->hypothesis->info().state_count;
+      double f[2] = {}, g[2] = {};
       if (count > 0) {
-        constexpr double kNudge = 1.0;  // Pa
         double nudged[2] = {e.z[0] + kNudge, e.z[1] + kNudge};
         models::effect_valve_derivative(effect, q, x, u, v, e.z, f);
         models::effect_valve_derivative(effect, q, x, u, v, nudged, g);
-        models::effect_command(effect, q, x, e.z, again);
-        for (int i = 0; i < count; ++i) {
-          const double slope = (g[i] - f[i]) / kNudge * move;
-          e.z[i] += move * f[i] * growth(slope);
-        }
-      } else {
-        models::effect_command(effect, q, x, e.z, again);
+      }
+      if (j + 1 < up_to_last_state) models::effect_command(effect, q, x, e.z, again);
+      for (int i = 0; i < count; ++i) {
+        const double slope = (g[i] - f[i]) / kNudge * move;
+        e.z[i] += move * f[i] * growth(slope);
       }
     }
   };

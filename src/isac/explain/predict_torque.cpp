@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <span>
 
 #include "isac/core/units.hpp"
 #include "isac/explain/predict_parts.hpp"
@@ -116,13 +117,21 @@ void add_ring(const PreparedRun& run, const Values& q, double inertia, double si
 
 }  // namespace
 
-double Predictor::base_torque(const ModelPoint& model, const Inputs& in, std::size_t k) const {
-  const JointPoint<double> x =
-      point_at(data_->rig, {}, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
-  double torque = 0;
-  for (std::size_t j = 0; j < terms_.size(); ++j)
-    torque += term_sign_[j] * models::effect_torque(terms_[j], &model.base[j], x);
-  return torque;
+void Predictor::add_base_torque(const ModelPoint& model, const Inputs& in, std::vector<double>& sum) const {
+  if (in.terms.empty()) {
+    const double one = 1;
+    in.terms.reserve(sum.size() * terms_.size());
+    for (std::size_t k = 0; k < sum.size(); ++k) {
+      const JointPoint<double> x =
+          point_at(data_->rig, {}, *in.angle, *in.velocity, *in.acceleration, in.pressure, 0, k);
+      for (std::size_t j = 0; j < terms_.size(); ++j)
+        in.terms.push_back(term_sign_[j] * models::effect_torque(terms_[j], &one, x));
+    }
+  }
+  const std::span<const double> output(model.base.data(), terms_.size());
+  const double* term = in.terms.data();
+  for (double& torque : sum)
+    for (const double parameter : output) torque += parameter * *term++;
 }
 
 std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run,

@@ -2,11 +2,11 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <functional>
-#include <thread>
 #include <utility>
+
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -359,7 +359,8 @@ Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses
   return yardstick;
 }
 
-Screen screen(const Around& place, const Library& library, const ScreenOptions& options, Responses* kept) {
+Screen screen(const Around& place, const Library& library, const ScreenOptions& options, Responses* kept,
+              const Screen* known) {
   const Prepared& data = place.predictor->data();
   const Screening screening(place, library, kept);
   // What a tolerance takes up within its bounds is no finding. (Nor could it be tested: the response to a shift of the angle
@@ -373,27 +374,29 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
     }
     return false;
   };
+  Screen result;
+  std::vector<char> have(library.hypotheses.size(), 0);
+  bool has_dictionary = false;
+  if (known != nullptr) {
+    result.columns = known->columns;
+    result.shapes = known->shapes;
+    for (const Screened& s : known->shapes) have[static_cast<std::size_t>(s.hypothesis)] = 1;
+    has_dictionary = std::any_of(known->columns.begin(), known->columns.end(),
+                                 [](const Column& c) { return c.hypothesis < 0; });
+  }
   std::vector<std::function<Done()>> tasks;
   const auto asked = [&](const Hypothesis& h) { return !options.only || options.only->count(h.id()) > 0; };
   for (std::size_t h = 0; h < library.hypotheses.size(); ++h)
-    if (asked(library.hypotheses[h]) && !taken_up(library.hypotheses[h]) &&
+    if (have[h] == 0 && asked(library.hypotheses[h]) && !taken_up(library.hypotheses[h]) &&
         !library.hypotheses[h].shapes.empty())
       tasks.emplace_back([&screening, h] { return screening.effect(static_cast<int>(h)); });
   if (kept != nullptr) kept->make_room(library.hypotheses.size(), screening.functions());
-  for (std::size_t d = 0; options.dictionary && d < screening.functions(); d += kTogether)
+  for (std::size_t d = 0; options.dictionary && !has_dictionary && d < screening.functions(); d += kTogether)
     tasks.emplace_back(
         [&screening, d] { return screening.dictionary(d, std::min(d + kTogether, screening.functions())); });
   std::vector<Done> done(tasks.size());
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t t = next++; t < tasks.size(); t = next++) done[t] = tasks[t]();
-  };
-  std::vector<std::thread> pool;
-  for (int i = 1; i < options.threads; ++i) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
+  share_work(options.threads, tasks.size(), [&](std::size_t t) { done[t] = tasks[t](); });
 
-  Screen result;
   for (Done& d : done) {
     for (Column& c : d.columns) result.columns.push_back(std::move(c));
     for (Screened& s : d.shapes) result.shapes.push_back(s);

@@ -109,9 +109,10 @@ class Responses {
   std::vector<Eigen::VectorXf> functions_;
 };
 
-/// `kept`: of the same data, library and weights.
+/// `kept`: of the same data, library and weights. `known`: a screen of the same place that was not asked for everything; what it has is taken
+/// from there.
 [[nodiscard]] Screen screen(const Around& place, const Library& library, const ScreenOptions& options,
-                            Responses* kept = nullptr);
+                            Responses* kept = nullptr, const Screen* known = nullptr);
 /// What the generic functions score beside one hypothesis, refitted. A rare effect that is large bends the whole fit, and what the fit then
 /// leaves in other blocks would be its own yardstick after all.
 struct Yardstick {

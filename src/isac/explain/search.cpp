@@ -92,7 +92,11 @@ void Search::forward() {
     Step step = step_here();
     asked_for_.reset();
     if (found_.wants_torque_of_free_runs) return;
-    if (narrow && !is_open(step)) step = step_here();
+    if (narrow && !is_open(step)) {
+      narrow_ = std::move(step.screen);
+      step = step_here();
+      narrow_.reset();
+    }
     if (found_.steps.empty()) found_.gate = step.gate;
     const bool open = is_open(step);
     say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
@@ -111,7 +115,8 @@ void Search::forward() {
     if (take) {
       const double size = step.trials.front().material;
       take = size >= options_.material;
-      if (take && !found_.added.empty()) take = is_clear_enough(whole_size(step.trials.front()));
+      if (take && !found_.added.empty())
+        take = is_clear_enough(whole_size(step.trials.front()), chains_of(step.trials.front()));
       if (take && found_.added.empty()) first_size_ = size;
       if (take) {
         largest_size_ = std::max(largest_size_, size);
@@ -136,10 +141,20 @@ void Search::forward() {
 }
 
 bool Search::is_open(const Step& step) const {
-  return step.gate.significant && step.gate.material &&
-         (found_.added.empty() || is_worth_a_second_name(step) ||
-          (step.gate.size >= kSmallRemainder * largest_size_ &&
-           step.units >= kHardlyAnything * largest_units_));
+  if (!step.gate.significant || !step.gate.material) return false;
+  if (found_.added.empty() || is_worth_a_second_name(step)) return true;
+  return step.gate.size >= small_in(step.gate.chain) &&
+         (!leaves_over_in(bit(step.gate.chain)) || step.units >= kHardlyAnything * largest_units_);
+}
+
+bool Search::leaves_over_in(unsigned chains) const {
+  const auto together = [](unsigned c) {
+    return ((c & kForceChains) != 0 ? kForceChains : 0U) |
+           ((c & kPressureChains) != 0 ? kPressureChains : 0U);
+  };
+  return std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
+    return (together(library_.hypotheses[static_cast<std::size_t>(h)].chains) & together(chains)) != 0;
+  });
 }
 
 double Search::whole_size(const Trial& t) const {
@@ -156,7 +171,8 @@ double Search::whole_size(const Trial& t) const {
 }
 
 bool Search::is_worth_a_second_name(const Step& step) const {
-  return !step.trials.empty() && is_clear_enough(whole_size(step.trials.front())) &&
+  return !step.trials.empty() &&
+         is_clear_enough(whole_size(step.trials.front()), chains_of(step.trials.front())) &&
          units_closed(step.trials.front()) > kLargeForSure;
 }
 

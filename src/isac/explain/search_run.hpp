@@ -59,10 +59,21 @@ class Search {
   bool is_open(const Step& step) const;
   /// Beside a wrong share of the first, a second effect shows little until both are refitted.
   bool is_worth_a_second_name(const Step& step) const;
-  /// What is left over after a good name is small; a remainder that needs another name must be as clear as the first, or the first was
-  /// only like the truth.
-  bool is_clear_enough(double size) const {
-    return size >= std::max(kSecondOfFirst * first_size_, kSecondOfFloor);
+  /// What is left over after a good name is small; a remainder in the same rows that needs another name must be as clear as the first, or the
+  /// first was only like the truth.
+  bool is_clear_enough(double size, unsigned chains) const {
+    return size >= std::max(leaves_over_in(chains) ? kSecondOfFirst * first_size_ : 0.0, kSecondOfFloor);
+  }
+  /// Does what was added enter rows that hang together with these? An equation that is only nearly right leaves nothing over in others: forces
+  /// hang together with the motion, and pressures with one another.
+  bool leaves_over_in(unsigned chains) const;
+  /// What is less beside the largest effect casts no doubt on its name.
+  double small_in(Chain chain) const {
+    const double small = kSmallRemainder * largest_size_;
+    return leaves_over_in(bit(chain)) ? small : std::min(small, kSecondOfFloor);
+  }
+  unsigned chains_of(const Trial& t) const {
+    return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains;
   }
   /// Of an effect that a tolerance took its share of, with that share.
   double whole_size(const Trial& t) const;
@@ -140,6 +151,7 @@ class Search {
   Found found_;
   Around place_;                                    ///< of found_.model
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
+  std::optional<Screen> narrow_;                    ///< of this place, that was asked for some ids only
   Responses responses_;
   double first_size_ = 0;  ///< of the first effect, over the floor
   double largest_size_ =

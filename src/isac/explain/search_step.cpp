@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <map>
 #include <optional>
-#include <thread>
 
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -69,7 +68,7 @@ Weights Search::noise_of_what_is_left() const {
 
 Screen Search::screen_here() {
   choose_blocks(place_.residual);
-  Screen s = screen(place_, library_, screen_options(), &responses_);
+  Screen s = screen(place_, library_, screen_options(), &responses_, narrow_ ? &*narrow_ : nullptr);
   if (s.candidates.empty() || s.candidates.front().gain <= 0) return s;
   const Screened first = s.candidates.front();
   const double before = data_.block_seconds;
@@ -126,28 +125,21 @@ void Search::add_other_moments(const Screened& best, const Screen& s, std::vecto
 
 std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
   std::vector<Trial> trials(list.size());
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < list.size(); i = next++) {
-      const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
-      Refined refined = refine(place_, h, list[i].start);
-      // Where the linear start was a bad one, the shape's own values are another.
-      if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
-        Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
-        if (other.loss < refined.loss) refined = std::move(other);
-      }
-      trials[i].hypothesis = list[i].hypothesis;
-      trials[i].values = refined.values;
-      trials[i].residual = std::move(refined.residual);
-      trials[i].loss = refined.loss;
-      trials[i].material =
-          size_over_floor(data_, found_.weights, found_.floors, trials[i].residual - place_.residual);
+  share_work(options_.threads, list.size(), [&](std::size_t i) {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
+    Refined refined = refine(place_, h, list[i].start);
+    // Where the linear start was a bad one, the shape's own values are another.
+    if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
+      Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
+      if (other.loss < refined.loss) refined = std::move(other);
     }
-  };
-  std::vector<std::thread> pool;
-  for (int t = 1; t < options_.threads; ++t) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
+    trials[i].hypothesis = list[i].hypothesis;
+    trials[i].values = refined.values;
+    trials[i].residual = std::move(refined.residual);
+    trials[i].loss = refined.loss;
+    trials[i].material =
+        size_over_floor(data_, found_.weights, found_.floors, trials[i].residual - place_.residual);
+  });
   return trials;
 }
 
@@ -166,8 +158,7 @@ Step Search::screened_step() {
 }
 
 Step Search::refitted(Step step) {
-  const double least =
-      std::max(options_.material, found_.added.empty() ? 0.0 : kSmallRemainder * largest_size_);
+  const double least = std::max(options_.material, found_.added.empty() ? 0.0 : small_in(step.gate.chain));
   if (!step.gate.significant || step.gate.size < kWorthALook * least) return step;
   step.trials = refit_all(shortlist(step.screen));
   std::set<std::string> ignored;
