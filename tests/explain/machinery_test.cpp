@@ -368,7 +368,39 @@ TEST(Explain, gives_no_name_to_a_friction_that_comes_and_goes) {
   })) << e.summary;
   ASSERT_TRUE(e.unknown.has_value());
   const std::vector<std::string>& on = e.unknown->depends_on;
-  EXPECT_EQ(std::count(on.begin(), on.end(), "velocity"), 1) << e.summary;
+  EXPECT_EQ(on, (std::vector<std::string>{"time", "velocity"})) << e.summary;
+}
+
+TEST(Explain, says_of_which_muscle_a_gain_is_bent_that_no_name_is_like) {
+  const test::TiedRig rig{.bent_by = 0.15, .bent_from = 3.4 * kPascalPerKgfCm2};
+  // Where the mean pressure stays, either muscle's pressure is the difference's: runs differ in it.
+  std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 1.5), test::by_hand(30, 0.3, 0.8, 0.7),
+                                 test::by_hand(30, 0.3, 0.8, -0.7), test::clamped(40, 0.1, 1.3, 6),
+                                 test::clamped(40, -0.1, 1.2, 9)};
+  day[1].mean_pressure_kgcm2 = 2.6;
+  day[3].mean_pressure_kgcm2 = 3.6;
+  const std::vector<PlannedRun> beyond = {test::clamped(20, 0, 1.0, 8), test::by_hand(20, 0.3, 1.5)};
+  const Explanation e = explain(test::record_all(rig, day), HeldOut(test::record_all(rig, beyond, 40)),
+                                {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kUnknown) << e.summary;
+  ASSERT_TRUE(e.unknown.has_value());
+  EXPECT_EQ(e.unknown->depends_on, std::vector<std::string>{"p2"}) << e.summary;
+  EXPECT_EQ(e.unknown->variable, "p2");
+  ASSERT_FALSE(e.unknown->at.empty());
+  EXPECT_GT(e.unknown->at.back(), 3.8);  // kg/cm2
+}
+
+TEST(Explain, hears_a_valve_that_hunts_though_functions_of_the_signals_are_like_it) {
+  const test::TiedRig rig{.hunting = 0.02 * kPascalPerKgfCm2};
+  const std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 1.5), test::clamped(30, 0.1, 1.3, 6),
+                                       test::clamped(30, -0.1, 1.2, 9, "steps")};
+  const std::vector<PlannedRun> beyond = {test::clamped(20, 0, 1.0, 8)};
+  const Explanation e = explain(test::record_all(rig, day), HeldOut(test::record_all(rig, beyond, 40)),
+                                {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kUnknown) << e.summary;
+  ASSERT_TRUE(e.unknown.has_value());
+  EXPECT_EQ(e.unknown->subsystem, "pcu") << e.summary;
+  EXPECT_EQ(e.unknown->depends_on, std::vector<std::string>{"time"}) << e.summary;
 }
 
 TEST(GenericFit, stands_beside_a_name_that_is_right_and_before_one_that_is_not) {

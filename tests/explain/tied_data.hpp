@@ -31,8 +31,10 @@ struct TiedRig {
   double encoder_drift = 0;               // rad/s from eight o'clock on
   double encoder_slip = 0, slip_at = 0;   // rad, s after eight o'clock
   double leak[2] = {0, 0}, deadband = 0;  // 1/s of each muscle; Pa of a valve that does not answer less
-  double angle_damping = 0;  // N m s/rad3: a damping that grows with φ², which no catalogue has
-  double threshold = 0;      // Pa that lift a bladder off
+  double angle_damping = 0;           // N m s/rad3: a damping that grows with φ², which no catalogue has
+  double bent_by = 0, bent_from = 0;  // share of its gain that muscle 2 loses above a pressure, Pa
+  double hunting = 0;                 // Pa by which the valves swing of themselves, at 2.5 Hz
+  double threshold = 0;               // Pa that lift a bladder off
   double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
   double known_inertia = 0;                // kg m2 that is believed; 0: the true one
   double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
@@ -107,7 +109,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
   const auto late = static_cast<std::size_t>(std::lround(rig.skew / kStep));
   const auto torque = [&](double w) {
     const auto pulling = [&](double pressure) { return std::max(0.0, pressure - rig.threshold); };
-    const double dp = 0.5 * (pulling(p[1]) - pulling(p[0])), pm = 0.5 * (p[0] + p[1]);
+    const double bent = rig.bent_by > 0 ? rig.bent_by * std::max(0.0, p[1] - rig.bent_from) : 0.0;
+    const double dp = 0.5 * (pulling(p[1]) - bent - pulling(p[0])), pm = 0.5 * (p[0] + p[1]);
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
     return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w -
            (rig.D + rig.angle_damping * angle * angle) * w -
@@ -168,7 +171,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       for (std::size_t c = 0; c < 8; ++c) out.columns[c].values.push_back(row[c]);
     }
     for (int i = 0; i < 2; ++i) {
-      const double u = command(held(t - rig.dead_time), i);
+      const double u = command(held(t - rig.dead_time), i) +
+                       (rig.hunting > 0 ? rig.hunting * std::sin(5 * 3.141592653589793 * t + phase[0]) : 0.0);
       if (rig.second_lag > 0) {
         q[i] += kStep / rig.second_lag * (u - q[i]);
       } else {

@@ -132,6 +132,7 @@ void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& 
   if (!found.steps.empty())
     e.unknown =
         describe_unknown(around(predictor, found.baseline, found.weights), found.steps.front().screen);
+  if (e.unknown && found.comes_and_goes) add_time(*e.unknown);
 }
 
 }  // namespace

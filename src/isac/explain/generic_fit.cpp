@@ -14,16 +14,10 @@ constexpr std::size_t kMostTaken = 3;
 constexpr double kStandsOut = 0.7;  // of the search's limit
 constexpr int kParametersOfOne = 1 + kChoosingOne;
 
-struct Entry {
-  std::size_t function;
-  Eigen::VectorXd rows;
-};
-
 }  // namespace
 
-GenericFit fit_generic(const Around& place, const Screen& screen) {
-  GenericFit fit;
-  fit.residual = place.residual;
+StandingOut standing_out(const Around& place, const Screen& screen) {
+  StandingOut out;
   const Prepared& data = place.predictor->data();
   const Dictionary generic(data);
   // Of each column: its gain if it were alone. The best of them decides the chain.
@@ -35,17 +29,24 @@ GenericFit fit_generic(const Around& place, const Screen& screen) {
       order.emplace_back(c.score * c.score / c.norm2, index);
     ++index;
   }
-  if (order.empty()) return fit;
+  if (order.empty()) return out;
   std::sort(order.rbegin(), order.rend());
-  fit.chain = generic.chain(order.front().second);
-  std::vector<Entry> entries;
+  out.chain = generic.chain(order.front().second);
   for (const auto& [gain, function] : order) {
-    if (entries.size() >= kTried) break;
-    if (generic.chain(function) != fit.chain) continue;
+    if (out.functions.size() >= kTried) break;
+    if (generic.chain(function) != out.chain) continue;
     Eigen::VectorXd rows = generic.rows(function);
     weigh(data, *place.weights, rows);
-    entries.push_back({function, place.project(rows)});
+    out.functions.push_back({function, place.project(rows)});
   }
+  return out;
+}
+
+GenericFit fit_generic(const Around& place, const StandingOut& among, double noise_unit) {
+  GenericFit fit;
+  fit.residual = place.residual;
+  fit.chain = among.chain;
+  std::vector<GenericRows> entries = among.functions;
   double first = 0;
   while (fit.functions.size() < kMostTaken) {
     std::size_t best = entries.size();
@@ -60,14 +61,18 @@ GenericFit fit_generic(const Around& place, const Screen& screen) {
     }
     if (best == entries.size()) break;
     if (fit.functions.empty()) first = best_gain;
-    if (best_gain < kWorthTaking * first || best_gain < kWorthTakingUnits * screen.noise_unit) break;
+    if (best_gain < kWorthTaking * first || best_gain < kWorthTakingUnits * noise_unit) break;
     fit.gain += best_gain;
     fit.functions.push_back(entries[best].function);
     const Eigen::VectorXd unit = entries[best].rows.normalized();
     fit.residual -= unit.dot(fit.residual) * unit;
-    for (Entry& e : entries) e.rows -= unit.dot(e.rows) * unit;
+    for (GenericRows& e : entries) e.rows -= unit.dot(e.rows) * unit;
   }
   return fit;
+}
+
+GenericFit fit_generic(const Around& place, const Screen& screen) {
+  return fit_generic(place, standing_out(place, screen), screen.noise_unit);
 }
 
 Comparison behind_generic(const Prepared& data, const Eigen::VectorXd& named, int named_parameters,

@@ -27,7 +27,20 @@ struct GenericFit {
   Eigen::VectorXd residual;            ///< r
 };
 
+/// A function's rows, weighted and projected off what was fitted.
+struct GenericRows {
+  std::size_t function = 0;  ///< of the dictionary
+  Eigen::VectorXd rows;
+};
+/// Functions of one chain, its best first, that stand out in a screen: what enters the selection.
+struct StandingOut {
+  Chain chain = Chain::kTorque;
+  std::vector<GenericRows> functions;
+};
+
 /// `screen`: of the same place, with its dictionary.
+[[nodiscard]] StandingOut standing_out(const Around& place, const Screen& screen);
+[[nodiscard]] GenericFit fit_generic(const Around& place, const StandingOut& among, double noise_unit);
 [[nodiscard]] GenericFit fit_generic(const Around& place, const Screen& screen);
 
 /// How far a named effect's residual is behind that of nameless functions (t > 0), each counted as the one of many that was looked for.

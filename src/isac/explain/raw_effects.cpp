@@ -221,9 +221,11 @@ bool is_mended_by_raw_effects(const Predictor& predictor, const Found& found, co
 
 void add_raw_effects(const Predictor& predictor, const Found& found, const Proof& proof,
                      const ExplainOptions& options, Explanation& e) {
-  if (e.verdict == Verdict::kUnknown) return;
   const ModelPoint& model = e.effects.empty() ? found.baseline.model : found.model.model;
-  if (e.effects.empty() && valve_hunts(predictor, model, found, options, e)) return;
+  const bool unnamed = e.verdict == Verdict::kUnknown, in_valves = e.unknown && e.unknown->subsystem == "pcu";
+  if (e.effects.empty() && (!unnamed || in_valves) && valve_hunts(predictor, model, found, options, e))
+    return;
+  if (unnamed) return;
   std::vector<RawEffect> effects = look(predictor, model, options);
   std::stable_sort(effects.begin(), effects.end(),
                    [](const RawEffect& a, const RawEffect& b) { return a.rms > b.rms; });

@@ -70,6 +70,7 @@ void Search::hold_against_itself() {
     found_.notes.push_back({id, "ruled out: " + why});
     say(id + ": ruled out: " + why);
     found_.adequate = false;
+    found_.comes_and_goes = found_.comes_and_goes || size.variation > kAsMuchAsItself;
   }
 }
 

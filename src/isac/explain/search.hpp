@@ -31,10 +31,11 @@ struct Found {
   Fit baseline, model;
   Weights weights;
   Floors floors;
-  std::vector<Step> steps;  ///< one for each effect that was added, and the last that was not
-  std::vector<int> added;   ///< hypotheses, in order
-  bool adequate = true;     ///< nothing significant and material is left
-  Gate gate;                ///< of the baseline
+  std::vector<Step> steps;      ///< one for each effect that was added, and the last that was not
+  std::vector<int> added;       ///< hypotheses, in order
+  bool adequate = true;         ///< nothing significant and material is left
+  bool comes_and_goes = false;  ///< what stood first is not of one size throughout (constancy.hpp)
+  Gate gate;                    ///< of the baseline
   /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
   std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 
@@ -12,6 +13,7 @@ namespace isac::explain {
 namespace {
 
 constexpr int kShapeBins = 24;
+constexpr double kNearlyAll = 0.9;  // of what functions took
 
 /// What the picture's abscissa is, for a variable of the dictionary.
 double abscissa(const PreparedRun& run, std::size_t k, const std::string& variable) {
@@ -21,6 +23,7 @@ double abscissa(const PreparedRun& run, std::size_t k, const std::string& variab
   if (variable == "time") return run.day_offset + run.time[k];
   if (!run.has_pressure) return kNotKnown;
   const double p1 = run.pressure[0][k] / kPascalPerKgfCm2, p2 = run.pressure[1][k] / kPascalPerKgfCm2;
+  if (variable == "p1" || variable == "p2") return variable == "p1" ? p1 : p2;
   return variable == "mean_pressure" ? 0.5 * (p1 + p2) : 0.5 * (p2 - p1);
 }
 
@@ -34,6 +37,51 @@ const char* unit_of(const std::string& variable) {
 const std::string& signal_of(const std::string& variable) {
   static const std::string kVelocity = "velocity";
   return variable == "direction" ? kVelocity : variable;
+}
+
+/// Powers of one muscle's pressure, and what bends where it passes shares of its range.
+StandingOut functions_of_muscle(const Around& place, Chain chain, std::size_t muscle) {
+  const Prepared& data = place.predictor->data();
+  double low = 1e300, high = -1e300;
+  for (const PreparedRun& run : data.runs)
+    for (const double p : run.pressure[muscle]) {
+      if (!std::isfinite(p)) continue;
+      low = std::min(low, p);
+      high = std::max(high, p);
+    }
+  StandingOut out{.chain = chain, .functions = {}};
+  const auto add = [&](const std::function<double(double)>& value) {
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+    for (std::size_t i = 0; i < data.rows.size(); ++i) {
+      const Row& row = data.rows[i];
+      const std::vector<double>& pressure = data.runs[row.run].pressure[muscle];
+      if (row.chain == chain && row.sample < pressure.size() && std::isfinite(pressure[row.sample]))
+        rows[static_cast<Eigen::Index>(i)] = value((pressure[row.sample] - low) / (high - low));
+    }
+    weigh(data, *place.weights, rows);
+    out.functions.push_back({out.functions.size(), place.project(rows)});
+  };
+  if (!(high > low)) return out;
+  for (const double power : {1.0, 2.0, 3.0, 4.0}) add([power](double p) { return std::pow(p, power); });
+  for (const double bend : {0.2, 0.35, 0.5, 0.65, 0.8})
+    add([bend](double p) { return std::max(0.0, p - bend); });
+  return out;
+}
+
+/// Where only pressures matter: is it one muscle's alone?
+void tell_muscle(const Around& place, const GenericFit& fit, double noise_unit,
+                 std::set<std::string>& variables) {
+  if (fit.chain != Chain::kTorque || variables.empty() ||
+      std::any_of(variables.begin(), variables.end(),
+                  [](const std::string& v) { return v != "delta_pressure" && v != "mean_pressure"; }))
+    return;
+  const double needed = (variables.size() > 1 ? kNearlyAll : 1 / kNearlyAll) * fit.gain;
+  double gain[2];
+  for (const std::size_t muscle : {0U, 1U})
+    gain[muscle] = fit_generic(place, functions_of_muscle(place, fit.chain, muscle), noise_unit).gain;
+  const std::size_t better = gain[1] > gain[0] ? 1 : 0;
+  if (gain[better] < needed || gain[1 - better] > kNearlyAll * gain[better]) return;
+  variables = {better == 0 ? "p1" : "p2"};
 }
 
 void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
@@ -84,6 +132,13 @@ void fill_shape(const Around& place, Chain chain, Unknown& unknown) {
 
 }  // namespace
 
+void add_time(Unknown& unknown) {
+  std::vector<std::string>& on = unknown.depends_on;
+  if (std::find(on.begin(), on.end(), "time") == on.end())
+    on.insert(std::upper_bound(on.begin(), on.end(), "time"), "time");
+  std::erase(unknown.independent, "time");
+}
+
 Unknown describe_unknown(const Around& place, const Screen& screen) {
   Unknown unknown;
   const Prepared& data = place.predictor->data();
@@ -104,6 +159,9 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
     if (depends.empty()) unknown.variable = variables.empty() ? "angle" : variables.back();
     for (const std::string& v : variables) depends.insert(signal_of(v));
   }
+  tell_muscle(place, fit, screen.noise_unit, depends);
+  if (depends.size() == 1 && depends.count(signal_of(unknown.variable)) == 0)
+    unknown.variable = *depends.begin();
   for (std::size_t c = 0; c < generic.size(); ++c)
     if (generic.chain(c) == chain)
       for (const std::string& v : generic.variables(c))

@@ -3,8 +3,9 @@
 ///
 /// Greedy forward selection among generic functions of the measured signals (screen.hpp, Dictionary), each freed of what the
 /// baseline can mimic, until another one takes less than a tenth of what the first did. The variables of those taken are what
-/// the effect depends on; of those tried and left, what it does not. The shape is the baseline's residual averaged over bins of
-/// the first variable, with 95 % bands from blocks.
+/// the effect depends on; of those tried and left, what it does not.
+/// Where only pressures matter, one muscle's is named if powers and bends of it alone take as much and the other's do not.
+/// The shape is the baseline's residual averaged over bins of the first variable, with 95 % bands from blocks.
 /// Units: those of Unknown. Threads: pure. Errors: none. Source: docs/derivations/explain.md.
 #pragma once
 
@@ -12,6 +13,9 @@
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
+
+/// What comes and goes depends on time, though no function of it tells when.
+void add_time(Unknown& unknown);
 
 [[nodiscard]] Unknown describe_unknown(const Around& baseline, const Screen& screen);
 

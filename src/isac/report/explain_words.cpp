@@ -141,6 +141,8 @@ std::string variable_in_words(const std::string& variable, const std::string& un
   if (unit == "m/s" && variable == "speed") return "speed |v|";
   static const std::map<std::string, std::string> kWords{{"delta_pressure", "pressure difference Δp"},
                                                          {"mean_pressure", "mean pressure"},
+                                                         {"p1", "pressure p1"},
+                                                         {"p2", "pressure p2"},
                                                          {"angle", "angle φ"},
                                                          {"velocity", "speed φ̇"},
                                                          {"memory", "what happened before"},
