@@ -386,6 +386,7 @@ TEST(Explain, says_of_which_muscle_a_gain_is_bent_that_no_name_is_like) {
   ASSERT_TRUE(e.unknown.has_value());
   EXPECT_EQ(e.unknown->depends_on, std::vector<std::string>{"p2"}) << e.summary;
   EXPECT_EQ(e.unknown->variable, "p2");
+  EXPECT_EQ(std::count(e.unknown->independent.begin(), e.unknown->independent.end(), "delta_pressure"), 0);
   ASSERT_FALSE(e.unknown->at.empty());
   EXPECT_GT(e.unknown->at.back(), 3.8);  // kg/cm2
 }

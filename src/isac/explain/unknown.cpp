@@ -166,6 +166,10 @@ Unknown describe_unknown(const Around& place, const Screen& screen) {
     if (generic.chain(c) == chain)
       for (const std::string& v : generic.variables(c))
         if (depends.count(signal_of(v)) == 0) tried.insert(signal_of(v));
+  if (depends.count("p1") + depends.count("p2") > 0) {  // which both are made of
+    tried.erase("delta_pressure");
+    tried.erase("mean_pressure");
+  }
   unknown.depends_on.assign(depends.begin(), depends.end());
   unknown.independent.assign(tried.begin(), tried.end());
   // Of what is explainable: the chain's squares beyond those of its noise.
