@@ -59,8 +59,9 @@ void Search::hold_against_itself() {
     const std::string id = found_.model.model.effects[effect].hypothesis->id();
     const Constancy size = constancy_of(baseline, found_.model, effect);
     const double alone = share_of(baseline, found_.model, effect, -1).norm();
+    const bool varies = size.variation > kAsMuchAsItself && size.variation > kForSure * size.error;
     std::string why;
-    if (size.variation > kAsMuchAsItself && size.variation > kForSure * size.error)
+    if (varies)
       why = fmt::format(
           "its size is not the same throughout: from one second to the next it varies by {:.0f} % of itself",
           100 * std::sqrt(size.variation));
@@ -70,7 +71,7 @@ void Search::hold_against_itself() {
     found_.notes.push_back({id, "ruled out: " + why});
     say(id + ": ruled out: " + why);
     found_.adequate = false;
-    found_.comes_and_goes = found_.comes_and_goes || size.variation > kAsMuchAsItself;
+    found_.comes_and_goes = found_.comes_and_goes || varies;
   }
 }
 

@@ -34,7 +34,7 @@ struct Found {
   std::vector<Step> steps;      ///< one for each effect that was added, and the last that was not
   std::vector<int> added;       ///< hypotheses, in order
   bool adequate = true;         ///< nothing significant and material is left
-  bool comes_and_goes = false;  ///< what stood first is not of one size throughout (constancy.hpp)
+  bool comes_and_goes = false;  ///< something named was not of one size throughout (constancy.hpp)
   Gate gate;                    ///< of the baseline
   /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
   std::vector<std::string> doubts;
