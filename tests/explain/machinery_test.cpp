@@ -391,6 +391,23 @@ TEST(Explain, says_of_which_muscle_a_gain_is_bent_that_no_name_is_like) {
   EXPECT_GT(e.unknown->at.back(), 3.8);  // kg/cm2
 }
 
+TEST(Explain, says_of_what_no_name_is_like_that_it_keeps_or_warms_with_the_speed_of_the_last_moments) {
+  struct Case {
+    test::TiedRig rig;
+    std::vector<std::string> on;
+  };
+  const std::vector<PlannedRun> beyond = {test::by_hand(20, 0.35, 0.7), test::by_hand(20, 0.3, 1.5)};
+  for (const Case& c :
+       {Case{{.spring = 0.6}, {"memory", "velocity"}}, Case{{.warming = 0.06}, {"time", "velocity"}}}) {
+    const Explanation e =
+        explain(test::record_all(c.rig, small_day()), HeldOut(test::record_all(c.rig, beyond, 40)),
+                {.rig = c.rig.facts(), .traces = false, .next_experiment = false});
+    EXPECT_EQ(e.verdict, Verdict::kUnknown) << e.summary;
+    ASSERT_TRUE(e.unknown.has_value()) << e.summary;
+    EXPECT_EQ(e.unknown->depends_on, c.on) << e.summary;
+  }
+}
+
 TEST(Explain, hears_a_valve_that_hunts_though_functions_of_the_signals_are_like_it) {
   const test::TiedRig rig{.hunting = 0.02 * kPascalPerKgfCm2};
   const std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 1.5), test::clamped(30, 0.1, 1.3, 6),

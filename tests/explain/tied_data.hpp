@@ -33,8 +33,13 @@ struct TiedRig {
   double leak[2] = {0, 0}, deadband = 0;  // 1/s of each muscle; Pa of a valve that does not answer less
   double angle_damping = 0;           // N m s/rad3: a damping that grows with φ², which no catalogue has
   double bent_by = 0, bent_from = 0;  // share of its gain that muscle 2 loses above a pressure, Pa
-  double hunting = 0;                 // Pa by which the valves swing of themselves, at 2.5 Hz
-  double threshold = 0;               // Pa that lift a bladder off
+  double spring = 0,
+         relaxes_in =
+             0.3;  // N m/rad that lets go with a time constant, s: a hysteresis that depends on the rate
+  double warming = 0,
+         warms_in = 8;   // N m s/rad of dry friction in proportion to the speed of the last seconds
+  double hunting = 0;    // Pa by which the valves swing of themselves, at 2.5 Hz
+  double threshold = 0;  // Pa that lift a bladder off
   double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
   double known_inertia = 0;                // kg m2 that is believed; 0: the true one
   double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
@@ -104,7 +109,7 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
   const double omega = hand ? run.peak_speed_rad_s / (run.amplitude_rad * steepest) : 0;
   double force[2] = {0, 0};
   double angle = middle, velocity = 0, shaft = middle, far_angle = middle, far_velocity = 0;
-  double dry = rig.dry;
+  double dry = rig.dry, stretched = 0, warmth = 0;
   std::vector<double> shafts;
   const auto late = static_cast<std::size_t>(std::lround(rig.skew / kStep));
   const auto torque = [&](double w) {
@@ -114,7 +119,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     const double sign = w > 0 ? 1 : w < 0 ? -1 : 0;
     return stiffness * angle + rig.B * rig.radius * dp - rig.C * w * w * w -
            (rig.D + rig.angle_damping * angle * angle) * w -
-           dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset + rig.asymmetry * pm / rig.p0;
+           dry * std::pow(pm / rig.p0, rig.load_exponent) * sign + rig.offset + rig.asymmetry * pm / rig.p0 -
+           rig.spring * stretched - rig.warming * warmth * sign;
   };
   series::Recording out;
   out.source = "run" + std::to_string(number) + ".csv";
@@ -141,6 +147,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
     }
     if (rig.dry_share < 1 && k % 5000 == 0)
       dry = uniform(random) < 6.283185307179586 * rig.dry_share ? rig.dry : 0;
+    stretched += kStep * (velocity - stretched / rig.relaxes_in);
+    warmth += kStep * (std::abs(velocity) - warmth) / rig.warms_in;
     shaft = std::clamp(shaft, angle - rig.encoder_play, angle + rig.encoder_play);
     if (late > 0) shafts.push_back(shaft);
     const double seen = late == 0 ? shaft : shafts[shafts.size() > late ? shafts.size() - 1 - late : 0];

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 
 #include "isac/core/units.hpp"
 #include "isac/explain/screen.hpp"
@@ -12,7 +13,11 @@ namespace {
 /// Signals of one row, each scaled to its range in the data.
 struct Scaled {
   double angle, velocity, dp, p0, sign, time, day, rate1, rate2, age;
+  double recent[3], warmth[2];  ///< velocity and speed of the last moments
 };
+
+constexpr double kRecent[] = {0.1, 0.3, 1.0};  // s, of a relaxation
+constexpr double kWarmth[] = {3, 10};          // s, of what motion leaves behind
 
 struct Function {
   const char* name;
@@ -85,20 +90,29 @@ const std::vector<Function>& functions() {
       {"after reversal 0.1",
        {"direction", "memory"},
        [](const Scaled& s) { return s.sign * std::exp(-s.age / 0.1); }},
+      {"velocity of the last 0.1 s", {"memory", "velocity"}, [](const Scaled& s) { return s.recent[0]; }},
+      {"velocity of the last 0.3 s", {"memory", "velocity"}, [](const Scaled& s) { return s.recent[1]; }},
+      {"velocity of the last 1 s", {"memory", "velocity"}, [](const Scaled& s) { return s.recent[2]; }},
+      {"sgn speed of the last 3 s",
+       {"time", "direction"},
+       [](const Scaled& s) { return s.sign * s.warmth[0]; }},
+      {"sgn speed of the last 10 s",
+       {"time", "direction"},
+       [](const Scaled& s) { return s.sign * s.warmth[1]; }},
   };
   return all;
 }
 
 constexpr double kTypicalLag = 0.17;  // s, of a valve unit (seed 4.1)
 
-/// The pressure that a command asks for, as slow as a valve unit is.
-std::vector<double> lagged(const std::vector<double>& command, double interval) {
-  const double keep = std::exp(-interval / kTypicalLag);
-  std::vector<double> out(command.size());
-  double p = command.empty() ? 0 : command.front();
-  for (std::size_t k = 0; k < command.size(); ++k) {
+/// A signal behind a first-order lag that has long stood at `start`.
+std::vector<double> lagged(const std::vector<double>& x, double interval, double lag, double start) {
+  const double keep = std::exp(-interval / lag);
+  std::vector<double> out(x.size());
+  double p = start;
+  for (std::size_t k = 0; k < x.size(); ++k) {
     out[k] = p;
-    p = command[k] + keep * (p - command[k]);
+    p = x[k] + keep * (p - x[k]);
   }
   return out;
 }
@@ -110,9 +124,20 @@ double largest(double so_far, double value) {
 }  // namespace
 
 struct Dictionary::Signals {
-  Scaled top{1e-9, 1e-9, 1e-9, 1e-9, 1, 1e-9, 1e-9, 1e-9, 1e-9, 1};
+  Scaled top{.angle = 1e-9,
+             .velocity = 1e-9,
+             .dp = 1e-9,
+             .p0 = 1e-9,
+             .sign = 1,
+             .time = 1e-9,
+             .day = 1e-9,
+             .rate1 = 1e-9,
+             .rate2 = 1e-9,
+             .age = 1,
+             .recent = {},
+             .warmth = {}};
   struct Extra {
-    std::vector<double> rate[2], age, sign;
+    std::vector<double> rate[2], age, sign, recent[std::size(kRecent)], warmth[std::size(kWarmth)];
     /// In a pressure's own chain the measured pressure would bring its slow noise along, which is the residual's; what was
     /// asked for has none.
     std::vector<double> asked[2], asked_rate[2];
@@ -137,9 +162,17 @@ Dictionary::Dictionary(const Prepared& data) : data_(&data) {
     for (int i = 0; i < 2; ++i) {
       e.rate[i] = rate_of(run.pressure[i]);
       if (!run.has_command) continue;
-      e.asked[i] = lagged(run.command[i], run.interval);
+      const std::vector<double>& command = run.command[i];
+      e.asked[i] = lagged(command, run.interval, kTypicalLag, command.empty() ? 0.0 : command.front());
       e.asked_rate[i] = rate_of(e.asked[i]);
     }
+    // (A recording begins at rest: what went before it is not known.)
+    for (std::size_t i = 0; i < std::size(kRecent); ++i)
+      e.recent[i] = lagged(run.velocity, run.interval, kRecent[i], 0);
+    std::vector<double> speed = run.dry_velocity;
+    for (double& w : speed) w = std::abs(w);
+    for (std::size_t i = 0; i < std::size(kWarmth); ++i)
+      e.warmth[i] = lagged(speed, run.interval, kWarmth[i], 0);
     e.age.assign(n, 1.0);
     e.sign.assign(n, 0.0);
     double sign = 0, at = 0;
@@ -202,6 +235,8 @@ Eigen::VectorXd Dictionary::rows(std::size_t column) const {
       s.velocity = run.velocity[k] / top.velocity;
       s.sign = e.sign[k];
       s.age = e.age[k];
+      for (std::size_t j = 0; j < std::size(kRecent); ++j) s.recent[j] = e.recent[j][k] / top.velocity;
+      for (std::size_t j = 0; j < std::size(kWarmth); ++j) s.warmth[j] = e.warmth[j][k] / top.velocity;
     }
     if (run.has_pressure) {
       const bool own = row.chain == Chain::kPressure1 || row.chain == Chain::kPressure2;
