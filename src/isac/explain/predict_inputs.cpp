@@ -97,6 +97,35 @@ void undo_play(double step, double half, std::vector<double>& angle) {
   }
 }
 
+/// Is one signal the other and a constant?
+bool is_shift_of(const std::vector<double>& x, const std::vector<double>& y) {
+  constexpr double kRounding = 1e-13;  // rad
+  for (std::size_t k = 1; k < x.size(); ++k)
+    if (!(std::abs((y[k] - x[k]) - (y[0] - x[0])) <= kRounding)) return false;
+  return true;
+}
+
+/// What a linear effect makes of an angle's reading, φ + δ with δ = c + a φ + b t, by its values at four points.
+struct AngleReading {
+  double constant, by_angle, by_time;
+
+  explicit AngleReading(const Active& a) {
+    const auto delta = [&](double angle, double time) {
+      models::Readings<double> y;
+      y.angle = angle;
+      models::effect_reading(a.hypothesis->effect, a.values.data(), time, static_cast<const double*>(nullptr),
+                             y);
+      return y.angle - angle;
+    };
+    constant = delta(0, 0);
+    by_angle = 0.5 * (delta(1, 0) - delta(-1, 0));
+    by_time = delta(0, 1) - constant;
+  }
+  double undone(double read, double time) const {
+    return (read - constant - by_time * time) / (1 + by_angle);
+  }
+};
+
 }  // namespace
 
 /// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot. A joint that rests stands
@@ -121,32 +150,38 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
       undo_play(data_->rig.angle_step, q[0], truth);
       continue;
     }
+    if (h.info().linear) {
+      const AngleReading reading(**it);
+      for (std::size_t k = 0; k < n; ++k)
+        truth[k] = reading.undone(truth[k], time_of(h, run, rests ? n / 2 : k));
+      continue;
+    }
     const std::vector<double> read = truth;
     for (int round = 0; round < kInversions; ++round)
       for (std::size_t k = 0; k < n; ++k) {
         models::Readings<double> y;
         y.angle = truth[k];
-        models::effect_reading(h.effect, q, time_of(h, run, rests && h.info().linear ? n / 2 : k),
-                               static_cast<const double*>(nullptr), y);
+        models::effect_reading(h.effect, q, time_of(h, run, k), static_cast<const double*>(nullptr), y);
         truth[k] = read[k] - (y.angle - truth[k]);
       }
   }
-  // φ_true = φ − δ with δ linear in φ and in t: the slopes of δ from two angles and two times.
   double by_angle = 0, by_time = 0;
   for (const Active* a : readings) {
     if (!a->hypothesis->info().linear) continue;
-    const auto delta = [&](double angle, double time) {
-      models::Readings<double> y;
-      y.angle = angle;
-      models::effect_reading(a->hypothesis->effect, a->values.data(), time,
-                             static_cast<const double*>(nullptr), y);
-      return y.angle - angle;
-    };
-    by_angle += 0.5 * (delta(1, 0) - delta(-1, 0));
-    if (!rests) by_time += delta(0, 1) - delta(0, 0);
+    const AngleReading reading(*a);
+    by_angle += reading.by_angle;
+    if (!rests) by_time += reading.by_time;
   }
   const double ratio = 1 / (1 + by_angle);
   const bool slow = !run.slow_acceleration.empty();
+  if (!smooth && is_shift_of(run.raw_angle, truth)) {
+    // A slip before this run, or after it: what is even, no derivative sees.
+    const double shift = n > 0 ? truth[0] - run.raw_angle[0] : 0.0;
+    in.own_angle = run.angle;
+    for (double& angle : in.own_angle) angle += shift;
+    in.angle = &in.own_angle;
+    return;
+  }
   if (smooth) {
     in.own_velocity = run.velocity;
     in.own_acceleration = run.acceleration;

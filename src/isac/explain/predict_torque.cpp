@@ -157,8 +157,8 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
     };
     JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {
-      for (std::size_t k = 0; k < sum.size(); ++k)
-        sum[k] += sign * models::effect_torque(h.effect, a.values.data(), at(k * every));
+      models::add_effect_torques(
+          h.effect, a.values.data(), [&](std::size_t k) { return at(k * every); }, sign, std::span(sum));
       continue;
     }
     Memory memory(a);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <string_view>
 
 #include "isac/explain/bounded_fit.hpp"
@@ -18,7 +19,9 @@ class Projected {
         hypothesis_(hypothesis),
         values_(start),
         free_(std::move(free)),
-        scale_(std::move(scale)) {}
+        scale_(std::move(scale)),
+        is_linear_(hypothesis.info().linear && place.held.slopes.cols() == 0 &&
+                   place.predictor->adds_up(place.fit->model, hypothesis)) {}
 
   Eigen::VectorXd residual_at(const Eigen::VectorXd& x) const {
     Active a;
@@ -30,10 +33,15 @@ class Projected {
                                                                     place_.here, a, *place_.weights)));
   }
 
-  bool operator()(const Eigen::VectorXd& at, Eigen::VectorXd& here, Eigen::MatrixXd* jacobian) const {
-    here = residual_at(at);
+  bool operator()(const Eigen::VectorXd& at, Eigen::VectorXd& here, Eigen::MatrixXd* jacobian) {
+    // A step that was good is where the next begins: its residual is known.
+    if (last_at_.size() != at.size() || last_at_ != at) {
+      last_ = residual_at(at);
+      last_at_ = at;
+    }
+    here = last_;
     if (!here.allFinite()) return false;
-    if (jacobian == nullptr) return true;
+    if (jacobian == nullptr || (is_linear_ && jacobian->cols() == at.size())) return true;
     jacobian->resize(here.size(), at.size());
     Eigen::VectorXd x = at;
     for (Eigen::Index k = 0; k < at.size(); ++k) {
@@ -58,6 +66,8 @@ class Projected {
   Values values_;
   std::vector<std::size_t> free_;
   std::vector<double> scale_;
+  bool is_linear_;  ///< the slopes are the same everywhere
+  Eigen::VectorXd last_at_, last_;
 };
 
 }  // namespace
@@ -122,8 +132,8 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
     lower[j] = hypothesis.lower[free[i]] / scale[i];
     upper[j] = hypothesis.upper[free[i]] / scale[i];
   }
-  const Projected problem(place, hypothesis, start, free, scale);
-  BoundedFit fit = bounded_fit(problem, x, lower, upper, {.rounds = iterations, .tolerance = 1e-6});
+  Projected problem(place, hypothesis, start, free, scale);
+  BoundedFit fit = bounded_fit(std::ref(problem), x, lower, upper, {.rounds = iterations, .tolerance = 1e-6});
   x = fit.x;
   Refined refined;
   refined.residual = std::move(fit.residual);

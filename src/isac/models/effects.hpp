@@ -17,6 +17,7 @@
 /// Example: `double p[] = {0.14}; effect_torque(find_effect("D"), p, JointPoint<double>{.velocity = 2.0})` is −0.28.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string_view>
 
@@ -65,6 +66,16 @@ struct TorqueCall {
   }
 };
 
+/// A loop for each effect, so that only what its equation asks of a point is reckoned.
+template <class S, class PointAt>
+struct TorquesCall {
+  template <class E>
+  static void call(const S* q, const PointAt& at, const S& factor, std::span<S> sum) noexcept {
+    if constexpr (requires(const JointPoint<S>& x) { E::torque(q, x); })
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += factor * E::torque(q, at(k));
+  }
+};
+
 template <class S>
 struct DerivativeCall {
   template <class E>
@@ -95,6 +106,15 @@ template <class S>
 template <class S>
 [[nodiscard]] S effect_torque(int effect, const S* parameters, const JointPoint<S>& point) noexcept {
   return effect_torque<S>(effect, parameters, point, nullptr);
+}
+
+/// sum[k] += factor · torque of an effect without states at the point at(k), for all k; `at` returns a JointPoint<S> and must not throw.
+template <class S, class PointAt>
+void add_effect_torques(int effect, const S* parameters, const PointAt& at, const S& factor,
+                        std::span<S> sum) noexcept {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::TorquesCall<S, PointAt>>[static_cast<unsigned>(effect)](parameters, at, factor,
+                                                                                    sum);
 }
 
 /// Rates of a torque effect's states, per second; nothing is written for effects without states.
