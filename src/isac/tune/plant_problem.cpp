@@ -160,6 +160,8 @@ PlantSolution solve(const PlantProblem& problem, const PlantVector& start, LagFo
   options.linear_solver_type = ceres::DENSE_QR;
   options.max_num_iterations = 80;
   options.function_tolerance = 1e-9;
+  options.line_search_interpolation_type =
+      ceres::QUADRATIC;  // a cubic one asks for all slopes at every step along the line
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &p, &summary);
