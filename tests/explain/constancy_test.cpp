@@ -4,52 +4,29 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 #include <vector>
 
-#include "tied_data.hpp"
+#include "prepared_day.hpp"
 
 namespace isac::explain {
 namespace {
 
-/// A day with dry friction, and the models fitted to it.
-class Day {
- public:
+/// A day by hand, and where its baseline stands.
+struct Day : test::PreparedDay {
+  Around place;
   explicit Day(const test::TiedRig& rig)
-      : data_(prepare(test::record_all(rig, {test::by_hand(40, 0.5, 1.5), test::by_hand(40, 0.4, 2.5)}),
-                      rig.facts(), {}, 4.0)),
-        library_(make_library(data_)),
-        predictor_(data_) {
-    for (double& sigma : weights_.sigma) sigma = 150;  // Pa
-    weights_.sigma[0] = weights_.sigma[3] = 0.003;
-    baseline_ = fit_baseline(predictor_, library_.tolerances, weights_);
-    place_ = around(predictor_, baseline_, weights_);
-  }
-  const Hypothesis& hypothesis(const std::string& id) const {
-    for (const Hypothesis& h : library_.hypotheses)
-      if (h.id() == id) return h;
-    throw std::runtime_error("no such hypothesis");
-  }
-  Fit fitted(const std::string& id) const {
+      : PreparedDay(rig, {test::by_hand(40, 0.5, 1.5), test::by_hand(40, 0.4, 2.5)}, 4.0),
+        place(around(predictor, baseline, weights)) {}
+  [[nodiscard]] Fit fitted(const char* id) const {
     const Hypothesis& h = hypothesis(id);
-    return refit(predictor_, baseline_, {{&h, h.shapes.front()}}, weights_);
+    return refit(predictor, baseline, {{&h, h.shapes.front()}}, weights);
   }
-  const Fit& baseline() const { return baseline_; }
-  const Around& place() const { return place_; }
-
- private:
-  Prepared data_;
-  Library library_;
-  Predictor predictor_;
-  Weights weights_;
-  Fit baseline_;
-  Around place_;
 };
 
 TEST(Constancy, of_a_friction_that_is_always_there_varies_by_a_tenth_of_itself_at_most) {
   const Day day({.dry = 0.03});
   const Fit fit = day.fitted("coulomb_friction");
-  const Constancy size = constancy_of(day.place(), fit, fit.tolerances);
+  const Constancy size = constancy_of(day.place, fit, fit.tolerances);
   EXPECT_LT(std::abs(size.variation), 0.01);
   EXPECT_GT(size.error, 0);
   EXPECT_LT(size.error, 0.01);
@@ -61,7 +38,7 @@ TEST(Constancy, of_a_friction_that_comes_and_goes_varies_by_more_than_itself) {
   for (const double share : {0.1, 0.2}) {
     const Day day({.dry = 0.06, .dry_share = share});
     const Fit fit = day.fitted("coulomb_friction");
-    const Constancy size = constancy_of(day.place(), fit, fit.tolerances);
+    const Constancy size = constancy_of(day.place, fit, fit.tolerances);
     const double expected = 0.5 * (1 - share) / share;
     EXPECT_GT(size.variation, 0.4 * expected) << share;
     EXPECT_LT(size.variation, 4 * expected) << share;
@@ -72,31 +49,31 @@ TEST(Constancy, of_a_friction_that_comes_and_goes_varies_by_more_than_itself) {
 TEST(Constancy, of_what_rests_or_has_no_amplitude_is_not_known) {
   const Day day({.offset = 0.02});
   const Fit fit = day.fitted("torque_offset");
-  EXPECT_TRUE(std::isnan(constancy_of(day.place(), fit, fit.tolerances).variation));
+  EXPECT_TRUE(std::isnan(constancy_of(day.place, fit, fit.tolerances).variation));
 }
 
 TEST(Share, of_all_of_an_effect_is_what_its_fit_closes) {
   const Day day({.dry = 0.03});
   const Fit fit = day.fitted("coulomb_friction");
-  const double alone = share_of(day.place(), fit, fit.tolerances, -1).squaredNorm();
-  EXPECT_NEAR(alone, day.baseline().loss - fit.loss, 0.02 * alone);
-  const double tenth = share_of(day.place(), fit, fit.tolerances, 0.1).squaredNorm();
+  const double alone = share_of(day.place, fit, fit.tolerances, -1).squaredNorm();
+  EXPECT_NEAR(alone, day.baseline.loss - fit.loss, 0.02 * alone);
+  const double tenth = share_of(day.place, fit, fit.tolerances, 0.1).squaredNorm();
   EXPECT_NEAR(tenth, 0.01 * alone, 1e-4 * alone);
 }
 
 TEST(Share, of_giants_that_cancel_is_many_times_what_they_close_together) {
   const test::TiedRig rig{.dry = 0.01};
   const Day day(rig);
-  Fit fit = day.baseline();
+  Fit fit = day.baseline;
   const double torque = 0.5, angle = torque / (rig.A * rig.radius * rig.radius);
   fit.model.effects.push_back({&day.hypothesis("torque_offset"), {torque}});
   fit.model.effects.push_back({&day.hypothesis("encoder_offset"), {angle}});
-  Eigen::VectorXd both = Eigen::VectorXd::Zero(day.place().here.size());
-  day.place().predictor->predict(fit.model, kAllChains, both);
-  both -= day.place().here;
-  weigh(day.place().predictor->data(), *day.place().weights, both);
-  const double together = day.place().project(both).norm();
-  const double alone = share_of(day.place(), fit, fit.tolerances, -1).norm();
+  Eigen::VectorXd both = Eigen::VectorXd::Zero(day.place.here.size());
+  day.predictor.predict(fit.model, kAllChains, both);
+  both -= day.place.here;
+  weigh(day.data, day.weights, both);
+  const double together = day.place.project(both).norm();
+  const double alone = share_of(day.place, fit, fit.tolerances, -1).norm();
   EXPECT_GT(alone, 8 * together);
 }
 

@@ -11,6 +11,7 @@
 #include "isac/explain/refine.hpp"
 #include "isac/explain/screen.hpp"
 #include "isac/explain/search.hpp"
+#include "prepared_day.hpp"
 #include "tied_data.hpp"
 
 namespace isac::explain {
@@ -99,29 +100,13 @@ std::vector<PlannedRun> small_day() {
           steps};
 }
 
-struct Day {
-  Prepared data;
-  Library library;
-  Predictor predictor;
-  Weights weights;
-  Fit baseline;
-  explicit Day(const test::TiedRig& rig)
-      : data(prepare(test::record_all(rig, small_day()), rig.facts(), {}, 2.0)),
-        library(make_library(data)),
-        predictor(data) {
-    weights.sigma[0] = weights.sigma[3] = 0.003;
-    weights.sigma[1] = weights.sigma[2] = 150;
-    baseline = fit_baseline(predictor, library.tolerances, weights);
-  }
-};
-
-const Day& quiet_day() {
-  static const Day day{test::TiedRig{}};
+const test::PreparedDay& quiet_day() {
+  static const test::PreparedDay day(test::TiedRig{}, small_day());
   return day;
 }
 
 TEST(Hypotheses, leave_every_row_as_it_is_where_they_are_absent) {
-  const Day& day = quiet_day();
+  const test::PreparedDay& day = quiet_day();
   Eigen::VectorXd without = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(day.predictor.rows()));
   day.predictor.predict(day.baseline.model, kAllChains, without);
   for (const Hypothesis& h : day.library.hypotheses) {
@@ -138,7 +123,7 @@ TEST(Hypotheses, leave_every_row_as_it_is_where_they_are_absent) {
 }
 
 TEST(Projection, takes_away_what_a_change_of_the_baseline_does_as_well) {
-  const Day& day = quiet_day();
+  const test::PreparedDay& day = quiet_day();
   const Around place = around(day.predictor, day.baseline, day.weights);
   for (std::size_t j = 0; j < day.predictor.base().size(); ++j) {
     ModelPoint changed = day.baseline.model;
@@ -153,7 +138,7 @@ TEST(Projection, takes_away_what_a_change_of_the_baseline_does_as_well) {
 }
 
 TEST(Responses, of_linear_effects_are_linear) {
-  const Day& day = quiet_day();
+  const test::PreparedDay& day = quiet_day();
   const Around place = around(day.predictor, day.baseline, day.weights);
   for (const Hypothesis& h : day.library.hypotheses) {
     if (!h.info().linear || h.info().hook != models::Hook::kTorque) continue;
@@ -167,7 +152,7 @@ TEST(Responses, of_linear_effects_are_linear) {
 }
 
 TEST(Responses, of_torques_at_one_sample_in_some_are_those_at_every_sample) {
-  const Day& day = quiet_day();
+  const test::PreparedDay& day = quiet_day();
   Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(day.predictor.rows()));
   day.predictor.predict(day.baseline.model, kAllChains, here);
   int compared = 0;
@@ -190,7 +175,7 @@ TEST(Responses, of_torques_at_one_sample_in_some_are_those_at_every_sample) {
 }
 
 TEST(Refine, finds_every_effect_that_the_data_holds_without_noise) {
-  const Day& day = quiet_day();
+  const test::PreparedDay& day = quiet_day();
   Around place = around(day.predictor, day.baseline, day.weights);
   int found = 0;
   for (const Hypothesis& h : day.library.hypotheses) {

@@ -13,36 +13,6 @@
 namespace isac::explain {
 namespace {
 
-struct Both {
-  double leak, deadband;  // 1/s, kg/cm2
-};
-
-class Pairs : public ::testing::TestWithParam<Both> {};
-
-TEST_P(Pairs, of_a_leak_and_a_deaf_valve_are_both_named_whichever_stands_first) {
-  test::TiedRig rig;
-  rig.leak[0] = GetParam().leak;
-  rig.deadband = GetParam().deadband * kPascalPerKgfCm2;
-  std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 2.5), test::clamped(30, 0.1, 1.2, 6),
-                                 test::clamped(30, 0.0, 0.9, 11, "steps"), test::by_hand(30, 0.3, 0.6, 0.7),
-                                 test::by_hand(30, 0.3, 1.0, -0.7)};
-  const std::vector<PlannedRun> beyond = {test::clamped(20, -0.1, 1.0, 8)};
-  constexpr std::uint32_t kFirst = 100;
-  std::string lines;
-  const Explanation e =
-      explain(test::record_all(rig, day, kFirst), HeldOut(test::record_all(rig, beyond, kFirst + 20)),
-              {.rig = rig.facts(),
-               .traces = false,
-               .next_experiment = false,
-               .progress = [&](const std::string& line) { lines += line + "\n"; }});
-  if (std::getenv("ISAC_SHOW") != nullptr) std::cout << lines;
-  std::set<std::string> names;
-  for (const Candidate& c : e.effects) names.insert(c.id);
-  EXPECT_EQ(names, (std::set<std::string>{"leak", "valve_deadband"})) << e.summary << "\n" << lines;
-}
-
-INSTANTIATE_TEST_SUITE_P(Of, Pairs, ::testing::Values(Both{0.0084, 0.0067}, Both{0.012, 0.006}));
-
 std::set<std::string> named_on(const test::TiedRig& rig, const std::vector<PlannedRun>& day,
                                const std::vector<PlannedRun>& beyond, std::string& told) {
   constexpr std::uint32_t kFirst = 100;
@@ -58,6 +28,26 @@ std::set<std::string> named_on(const test::TiedRig& rig, const std::vector<Plann
   for (const Candidate& c : e.effects) names.insert(c.id);
   return names;
 }
+
+struct Both {
+  double leak, deadband;  // 1/s, kg/cm2
+};
+
+class Pairs : public ::testing::TestWithParam<Both> {};
+
+TEST_P(Pairs, of_a_leak_and_a_deaf_valve_are_both_named_whichever_stands_first) {
+  test::TiedRig rig;
+  rig.leak[0] = GetParam().leak;
+  rig.deadband = GetParam().deadband * kPascalPerKgfCm2;
+  const std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 2.5), test::clamped(30, 0.1, 1.2, 6),
+                                       test::clamped(30, 0.0, 0.9, 11, "steps"),
+                                       test::by_hand(30, 0.3, 0.6, 0.7), test::by_hand(30, 0.3, 1.0, -0.7)};
+  const std::vector<PlannedRun> beyond = {test::clamped(20, -0.1, 1.0, 8)};
+  std::string told;
+  EXPECT_EQ(named_on(rig, day, beyond, told), (std::set<std::string>{"leak", "valve_deadband"})) << told;
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, Pairs, ::testing::Values(Both{0.0084, 0.0067}, Both{0.012, 0.006}));
 
 // The offset closes less than 1 % of the units that the friction does, because the zero wanders as much; it is as large over the floor.
 TEST(Pair, of_a_friction_and_an_offset_is_named_though_the_zero_wanders) {

@@ -5,41 +5,22 @@
 
 #include <cmath>
 #include <cstdint>
-#include <stdexcept>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "isac/explain/explain.hpp"
 #include "isac/explain/fit.hpp"
-#include "tied_data.hpp"
+#include "prepared_day.hpp"
 
 namespace isac::explain {
 namespace {
 
-struct Day {
-  Prepared data;
-  Library library;
-  Predictor predictor;
-  Weights weights;
-  Fit baseline;
+struct Day : test::PreparedDay {
   Day(const test::TiedRig& rig, std::uint32_t first)
-      : data(prepare(test::record_all(rig,
-                                      {test::clamped(20, 0.1, 1.2, 6), test::by_hand(20, 0.5, 1.5),
-                                       test::free_in_steps(16, 4, 0.8)},
-                                      first),
-                     rig.facts(), {}, 2.0)),
-        library(make_library(data)),
-        predictor(data) {
-    weights.sigma[0] = weights.sigma[3] = 0.003;
-    weights.sigma[1] = weights.sigma[2] = 150;
-    baseline = fit_baseline(predictor, library.tolerances, weights);
-  }
-  [[nodiscard]] const Hypothesis& hypothesis(std::string_view id) const {
-    for (const Hypothesis& h : library.hypotheses)
-      if (h.info().id == id) return h;
-    throw std::out_of_range(std::string(id));
-  }
+      : PreparedDay(
+            rig,
+            {test::clamped(20, 0.1, 1.2, 6), test::by_hand(20, 0.5, 1.5), test::free_in_steps(16, 4, 0.8)},
+            2.0, first) {}
   [[nodiscard]] Uncertain beside(const Hypothesis& h, const Values& start, Values* found = nullptr) const {
     const Fit fit = refit(predictor, baseline, {{&h, start}}, weights, 12);
     if (found != nullptr) *found = fit.model.effects.back().values;

@@ -13,6 +13,7 @@ namespace {
 // Sigma that a general case must lead a simpler one by to stand first, and to stand beside it. If the general one is true and s sigma of
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
+constexpr double kHardlyMore = 1.25;  // of the friction in motion: at rest it is nearly the same
 constexpr double kLimitReach =
     8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
@@ -34,6 +35,8 @@ std::string Ranking::id_of(const Trial& t) const {
 
 bool Ranking::is_limit_case(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] < kHardlyMore * t.values[0])
+    return true;
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     const auto& parameter = h.info().parameters[i];

@@ -42,7 +42,8 @@ class Ranking {
 
   [[nodiscard]] int parameters_of(const Trial& trial) const;
   [[nodiscard]] std::string id_of(const Trial& trial) const;
-  /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none.
+  /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none, and a
+  /// friction that is hardly larger at rest is dry friction.
   [[nodiscard]] bool is_limit_case(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
