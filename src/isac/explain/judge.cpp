@@ -37,11 +37,11 @@ Jackknife jackknife(const Eigen::VectorXd& left, const Eigen::VectorXd& norm2) {
           all * all / norm2.squaredNorm()};
 }
 
-double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2) {
+double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, double run_error2) {
   const Jackknife of = jackknife(score - score.sum() / norm2.sum() * norm2, norm2);
   if (!(of.carried_by > 2)) return 1;  // no freedom is left
-  return of.scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / of.scatter, of.carried_by - 1)
-                        : 1.0;
+  const double scatter = std::sqrt(of.scatter * of.scatter + run_error2);
+  return scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / scatter, of.carried_by - 1) : 1.0;
 }
 
 /// p-value of a score of which whole runs scatter more than their blocks do:
@@ -206,7 +206,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     c.T = 0;
     c.rare_p = 1;
     if (c.norm2 <= 0) continue;
-    const double scatter2 = joined(c.atom_score).squaredNorm();
+    const double scatter2 = joined(c.atom_score).squaredNorm() + c.run_error.squaredNorm();
     c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
     c.unit = scatter2 / c.norm2;
     c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
@@ -215,12 +215,16 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
   }
   if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
-  Eigen::MatrixXd scores(blocks, static_cast<Eigen::Index>(result.columns.size()));
+  const auto runs = static_cast<Eigen::Index>(data.runs.size());
+  Eigen::MatrixXd scores =
+      Eigen::MatrixXd::Zero(blocks + runs, static_cast<Eigen::Index>(result.columns.size()));
   double rare_columns = 0;
   const Elsewhere elsewhere(result.columns, joined, seen), beside(yardstick.functions, joined, seen);
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
-    scores.col(static_cast<Eigen::Index>(k)) = joined(c.atom_score);
+    const Eigen::VectorXd score = joined(c.atom_score);
+    scores.col(static_cast<Eigen::Index>(k)).head(blocks) = score;
+    if (c.run_error.size() > 0) scores.col(static_cast<Eigen::Index>(k)).tail(runs) = c.run_error;
     double most = 0;
     for (int chain = 0; chain < kChains; ++chain)
       if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
@@ -237,9 +241,10 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
         seen_in = std::min(seen_in, there.blocks);
       }
       if (std::isfinite(unit))
-        c.rare_p = series::student_t_two_sided(std::abs(c.score) / std::sqrt(unit * c.norm2), seen_in);
+        c.rare_p = series::student_t_two_sided(
+            std::abs(c.score) / std::sqrt(unit * c.norm2 + c.run_error.squaredNorm()), seen_in);
     } else {
-      c.rare_p = jackknife_p(scores.col(static_cast<Eigen::Index>(k)), own);
+      c.rare_p = jackknife_p(score, own, c.run_error.squaredNorm());
     }
     c.rare_p = std::max(c.rare_p, told_by_runs(c).value_or(0));
     ++rare_columns;

@@ -242,6 +242,11 @@ double Predictor::stiffness(const ModelPoint& model) const noexcept {
   return model.base[static_cast<std::size_t>(stiffness_)] * r * r;
 }
 
+double Predictor::pressure_gain(const ModelPoint& model) const noexcept {
+  return pressure_gain_ < 0 ? 0.0
+                            : model.base[static_cast<std::size_t>(pressure_gain_)] * data_->rig.wheel_radius;
+}
+
 void Predictor::predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const {
   share_work(threads_, data_->runs.size(), [&](std::size_t r) { predict_run(model, r, chains, out); });
 }

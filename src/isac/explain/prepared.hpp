@@ -54,8 +54,10 @@ struct PreparedRun {
   std::vector<double> time;                           ///< s
   std::vector<double> raw_angle;                      ///< rad as read
   std::vector<double> angle, velocity, acceleration;  ///< low-passed
-  std::vector<double> dry_velocity;        ///< velocity that an encoder can tell from standing still
-  std::vector<double> raw_pressure[2];     ///< Pa as read
+  std::vector<double> dry_velocity;     ///< velocity that an encoder can tell from standing still
+  std::vector<double> raw_pressure[2];  ///< Pa as read
+  double mean_pressure_error =
+      0;  ///< Pa, of the whole run's mean of (p2 − p1)/2, where its noise was taken out of the rest
   std::vector<double> smooth_pressure[2];  ///< Pa, low-passed: what the valve unit's model is held against
   /// Pa, what enters the torque: low-passed more where the pressure rests, so that its noise does not pass for torque.
   std::vector<double> pressure[2];

@@ -282,6 +282,26 @@ void QuietPressure::apply(Prepared& data) const {
         for (std::size_t b = 0; b < kBands; ++b) p[k] += felt_[b] * part.rest[i][b][k];
       }
     }
+  for (std::size_t r = 0; r < data.runs.size(); ++r)
+    data.runs[r].mean_pressure_error =
+        parts[r].by_rule[0].empty() ? 0.0 : error_of_mean(parts[r], data.runs[r]);
+}
+
+/// Of what was taken out, a run's mean stays in: as uncertain as blocks of it say.
+double QuietPressure::error_of_mean(const Parts& parts, const PreparedRun& run) const {
+  std::vector<double> blocks;
+  const std::size_t n = run.time.size();
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto block = static_cast<std::size_t>(run.time[k] / kBlock);
+    if (block >= blocks.size()) blocks.resize(block + 1, 0.0);
+    for (std::size_t b = 0; b < kBands; ++b)
+      blocks[block] += 0.5 * (1 - felt_[b]) * (parts.rest[1][b][k] - parts.rest[0][b][k]);
+  }
+  const auto count = static_cast<double>(blocks.size());
+  if (count < 2) return 0;
+  double squares = 0;  // of sums about their mean, which is nothing
+  for (const double sum : blocks) squares += sum * sum;
+  return std::sqrt(squares * count / (count - 1)) / static_cast<double>(n);
 }
 
 }  // namespace isac::explain

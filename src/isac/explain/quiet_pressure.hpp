@@ -7,7 +7,8 @@
 /// p̂: the valve's first-order lag of the command; G: what smooth functions of command, motion and time make of the rest, so all
 /// that a valve or a sensor does by rule; r: what remains, in three bands (faster than 0.15 s, slower than 1 s, between). A band that the
 /// torque follows is pressure (λ = 1), one that it does not follow is the sensor's noise (λ = 0), which would enter the torque with
-/// B r as large as the force's own. Where the torque cannot tell, the reading stands as it is (prior of λ: 1 ± 0.5).
+/// B r as large as the force's own. A run's mean of r stays in, for G may be off where nothing was fitted; its error, which no scatter within the
+/// run shows, is PreparedRun::mean_pressure_error. Where the torque cannot tell, the reading stands as it is (prior of λ: 1 ± 0.5).
 /// Units: SI. Threads: values. Errors: none; without commands or torque nothing is changed.
 /// Source: docs/derivations/explain.md; errors in variables: Fuller, Measurement Error Models, 1987, 1.2.
 #pragma once
@@ -34,6 +35,7 @@ class QuietPressure {
  private:
   struct Parts;
   [[nodiscard]] std::vector<Parts> parts_of(const Prepared& data) const;
+  [[nodiscard]] double error_of_mean(const Parts& parts, const PreparedRun& run) const;
 
   ModelPoint model_;            ///< of the rough fit: K_C, T_C
   Eigen::VectorXd by_rule_[2];  ///< coefficients of G

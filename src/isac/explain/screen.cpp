@@ -71,7 +71,7 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
 
 /// Rows of one chain in one atom, one after another.
 struct Stretch {
-  Eigen::Index from = 0, rows = 0, atom = 0;
+  Eigen::Index from = 0, rows = 0, atom = 0, run = 0;
   int chain = 0;
   bool ends_run = false;  ///< the last of its chain in its run
 };
@@ -87,6 +87,7 @@ std::vector<Stretch> stretches_of(const Prepared& data) {
       stretches.push_back({.from = from,
                            .rows = 0,
                            .atom = static_cast<Eigen::Index>(row.atom),
+                           .run = static_cast<Eigen::Index>(row.run),
                            .chain = static_cast<int>(row.chain),
                            .ends_run = false});
     }
@@ -122,7 +123,8 @@ class Screening {
         data_(place.predictor->data()),
         generic_(data_),
         kept_(kept),
-        stretches_(stretches_of(data_)) {}
+        stretches_(stretches_of(data_)),
+        error_of_means_(error_of_means()) {}
 
   std::size_t functions() const { return generic_.size(); }
 
@@ -187,6 +189,17 @@ class Screening {
  private:
   Eigen::Index rows() const { return static_cast<Eigen::Index>(data_.rows.size()); }
 
+  /// Weighted torque that an error of one deviation in a run's mean pressure makes, all runs side by side.
+  Eigen::VectorXd error_of_means() const {
+    Eigen::VectorXd torque = Eigen::VectorXd::Zero(rows());
+    const double gain = place_.predictor->pressure_gain(place_.fit->model);
+    for (std::size_t i = 0; i < data_.rows.size(); ++i)
+      if (data_.rows[i].chain == Chain::kTorque)
+        torque[static_cast<Eigen::Index>(i)] = gain * data_.runs[data_.rows[i].run].mean_pressure_error;
+    if (torque.squaredNorm() > 0) weigh(data_, *place_.weights, torque);
+    return torque;
+  }
+
   /// Weighted responses to every way, side by side.
   Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, const std::vector<std::vector<Values>>& ways,
                           Eigen::Index columns) const {
@@ -212,6 +225,7 @@ class Screening {
     column.raw_norm2 = raw_norm2;
     column.atom_score = Eigen::VectorXd::Zero(atoms);
     column.atom_norm = Eigen::VectorXd::Zero(atoms);
+    column.run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_.runs.size()));
     double held_by_runs = 0, sum = 0;
     Eigen::Index count = 0;
     for (const Stretch& s : stretches_) {
@@ -221,6 +235,8 @@ class Screening {
       column.atom_score[s.atom] -= part.dot(place_.residual.segment(s.from, s.rows));
       column.atom_norm[s.atom] += norm2;
       column.chain_norm2[s.chain] += norm2;
+      if (s.chain == static_cast<int>(Chain::kTorque))
+        column.run_error[s.run] += part.dot(error_of_means_.segment(s.from, s.rows));
       sum += part.sum();
       count += s.rows;
       if (!s.ends_run) continue;
@@ -240,6 +256,7 @@ class Screening {
     // A third of a percent of a response is how its column was low-passed, not what the effect does.
     if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
       column.atom_score.setZero();
+      column.run_error.setZero();
       column.norm2 = 0;
     }
     column.score = column.atom_score.sum();
@@ -300,6 +317,7 @@ class Screening {
   const Dictionary generic_;
   Responses* kept_;
   const std::vector<Stretch> stretches_;
+  const Eigen::VectorXd error_of_means_;
 };
 
 }  // namespace

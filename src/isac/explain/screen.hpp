@@ -12,6 +12,8 @@
 /// Bonferroni over as many columns. What rests within its runs (an offset, a drift of the day) is told from a sensor's zero that moves
 /// between runs by its runs alone: where those scatter more than their blocks do, T is Student's of the runs' scatter, as a normal's. Scatter
 /// is of what is left beside the column, and beside tolerances that were held at a bound against it: they come back.
+/// Where a pressure sensor's noise was taken out of the torque but for each run's mean (quiet_pressure.hpp), the error of that mean is the same
+/// in all blocks of its run: e_r = Σ_{i∈r} x⊥_i · B r δp_r is one block more, with nothing in Σ g_b: T = |Σ g_b|/√(Σ g_b² + Σ e_r²).
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -38,9 +40,11 @@ struct Column {
   std::string name;                       ///< of a dictionary column
   Chain chain = Chain::kTorque;           ///< of a dictionary column
   Eigen::VectorXd atom_score, atom_norm;  ///< of the shortest blocks: Σ x⊥ r, Σ x⊥²
-  Eigen::VectorXd atom_left;    ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
-  double score = 0, norm2 = 0;  ///< Σ g_b, Σ x⊥²
-  double raw_norm2 = 0;         ///< Σ x²: what was there before the projection
+  Eigen::VectorXd atom_left;  ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
+  Eigen::VectorXd
+      run_error;  ///< what the error of each run's mean pressure makes of its score, one deviation
+  double score = 0, norm2 = 0;       ///< Σ g_b, Σ x⊥²
+  double raw_norm2 = 0;              ///< Σ x²: what was there before the projection
   double chain_norm2[kChains] = {};  ///< Σ x⊥² of each chain
   double plain_norm2[kChains] = {};  ///< the same of x⊥/σ as it is in time, before the noise's filter
   double resting = 0;                ///< share of Σ x⊥² that the means of its runs hold, 0 to 1
