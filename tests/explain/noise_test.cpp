@@ -326,6 +326,17 @@ TEST(QuietPressure, keeps_what_the_torque_follows_and_drops_what_only_the_sensor
     } else {
       EXPECT_LT(quiet.felt()[1], 0.25);
     }
+    // Noise of 2 kPa and a memory of 0.3 s in either sensor leaves a run's mean of half their difference uncertain by √(2·0.3 s/30 s) of
+    // √½ of that; what the torque follows is no error.
+    const double expected = std::sqrt(0.5) * 2000 * std::sqrt(2 * 0.3 / 30);
+    for (const PreparedRun& run : data.runs) {
+      if (felt) {
+        EXPECT_LT(run.mean_pressure_error, 0.3 * expected);
+      } else {
+        EXPECT_GT(run.mean_pressure_error, 0.4 * expected);
+        EXPECT_LT(run.mean_pressure_error, 1.6 * expected);
+      }
+    }
   }
 }
 

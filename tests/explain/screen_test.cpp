@@ -138,6 +138,30 @@ TEST(Judge, still_sees_what_rests_within_runs_where_the_runs_agree) {
   EXPECT_GE(seen, 190);
 }
 
+// An error that a whole run shares scatters in none of its blocks: it is counted, in T and in the flips.
+TEST(Judge, counts_the_error_that_all_blocks_of_a_run_share) {
+  const Setting setting = setting_of_runs();
+  std::mt19937_64 random(12);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 2000;
+  const double shared = 0.25;  // of a block's own deviation; 1.1 of that of the sum of its run's twenty
+  int counted = 0, ignored = 0, small = 0;
+  for (int i = 0; i < kDraws; ++i)
+    for (const bool known : {true, false}) {
+      Screen screen = resting_screen(0, shared, false, random);
+      Column& c = screen.columns[0];
+      if (known) c.run_error = Eigen::VectorXd::Constant(kRuns, shared * c.norm2 / kRuns);
+      judge(screen, setting.data, setting.library, {.flips = 19});
+      (known ? counted : ignored) += c.T > 1.96 ? 1 : 0;
+      if (known) small += screen.p_value <= 0.05 ? 1 : 0;
+    }
+  EXPECT_LE(counted, 0.065 * kDraws);
+  EXPECT_GE(counted, 0.035 * kDraws);
+  EXPECT_LE(small, 0.065 * kDraws);
+  EXPECT_GE(small, 0.035 * kDraws);
+  EXPECT_GE(ignored, 0.12 * kDraws);
+}
+
 TEST(Judge, scatter_of_runs_is_that_of_what_is_left_beside_the_column) {
   // A drift of which a tolerance, held at its bound, took a constant: its scores grow from run to run, and so does what its own
   // amplitude leaves of them. With the tolerance come back nothing but noise is left.
