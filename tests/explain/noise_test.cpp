@@ -340,6 +340,20 @@ TEST(QuietPressure, keeps_what_the_torque_follows_and_drops_what_only_the_sensor
   }
 }
 
+TEST(QuietPressure, knows_the_error_of_a_runs_mean_though_readings_are_missing) {
+  const test::TiedRig rig;
+  auto runs = with_slow_pressure_noise(false);
+  for (series::Column& c : runs[1].columns)
+    if (c.name == "p1")
+      for (std::size_t k = 4000; k < 4040; ++k) c.values[k] = std::nan("");
+  Prepared data = prepare(runs, rig.facts(), {}, 2.0);
+  (void)QuietPressure::learn(data);
+  for (const PreparedRun& run : data.runs) {
+    EXPECT_GT(run.mean_pressure_error, 20);
+    EXPECT_LT(run.mean_pressure_error, 500);
+  }
+}
+
 TEST(QuietPressure, leaves_readings_alone_without_commands) {
   const test::TiedRig rig;
   auto runs = test::record_all(rig, {test::by_hand(20, 0.4, 1.5), test::by_hand(20, 0.3, 0.7)});

@@ -166,7 +166,7 @@ Dictionary::Dictionary(const Prepared& data) : data_(&data) {
       e.asked[i] = lagged(command, run.interval, kTypicalLag, command.empty() ? 0.0 : command.front());
       e.asked_rate[i] = rate_of(e.asked[i]);
     }
-    // (A recording begins at rest: what went before it is not known.)
+    // What went before a recording is not known: it is taken to begin at rest.
     for (std::size_t i = 0; i < std::size(kRecent); ++i)
       e.recent[i] = lagged(run.velocity, run.interval, kRecent[i], 0);
     std::vector<double> speed = run.dry_velocity;

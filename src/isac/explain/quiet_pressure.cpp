@@ -292,10 +292,12 @@ double QuietPressure::error_of_mean(const Parts& parts, const PreparedRun& run) 
   std::vector<double> blocks;
   const std::size_t n = run.time.size();
   for (std::size_t k = 0; k < n; ++k) {
-    const auto block = static_cast<std::size_t>(run.time[k] / kBlock);
+    const auto block = static_cast<std::size_t>(static_cast<double>(k) * run.interval / kBlock);
     if (block >= blocks.size()) blocks.resize(block + 1, 0.0);
+    double out = 0;
     for (std::size_t b = 0; b < kBands; ++b)
-      blocks[block] += 0.5 * (1 - felt_[b]) * (parts.rest[1][b][k] - parts.rest[0][b][k]);
+      out += 0.5 * (1 - felt_[b]) * (parts.rest[1][b][k] - parts.rest[0][b][k]);
+    if (std::isfinite(out)) blocks[block] += out;
   }
   const auto count = static_cast<double>(blocks.size());
   if (count < 2) return 0;
