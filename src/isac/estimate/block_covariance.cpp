@@ -1,9 +1,10 @@
 #include "isac/estimate/block_covariance.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "isac/estimate/linear_algebra.hpp"
 
 namespace isac::estimate {
 
@@ -17,10 +18,12 @@ BlockCovariance block_covariance(const std::vector<BlockSums>& blocks, const Pri
   Eigen::MatrixXd bread = Eigen::MatrixXd::Zero(n, n);
   for (const BlockSums& block : blocks) bread += block.curvature;
   if (prior.curvature.size() == n) bread.diagonal() += prior.curvature;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(bread);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().minCoeff() > 0)) return out;
-  const Eigen::MatrixXd root = eigen.operatorSqrt();
-  const Eigen::MatrixXd inverse_root = eigen.operatorInverseSqrt();
+  const SymmetricEigen eigen = symmetric_eigen(bread);
+  if (!eigen.converged || !(eigen.values.minCoeff() > 0)) return out;
+  const Eigen::VectorXd sizes = eigen.values.cwiseSqrt();
+  const Eigen::MatrixXd root = eigen.vectors * sizes.asDiagonal() * eigen.vectors.transpose();
+  const Eigen::MatrixXd inverse_root =
+      eigen.vectors * sizes.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   const Eigen::MatrixXd inverse = inverse_root * inverse_root;
 
   Eigen::MatrixXd meat = Eigen::MatrixXd::Zero(n, n);
@@ -28,12 +31,12 @@ BlockCovariance block_covariance(const std::vector<BlockSums>& blocks, const Pri
   std::vector<Eigen::MatrixXd> cross(static_cast<std::size_t>(n), Eigen::MatrixXd::Zero(n, n));
   for (const BlockSums& block : blocks) {
     const Eigen::MatrixXd share = inverse_root * block.curvature * inverse_root;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> own(share);
+    const SymmetricEigen own = symmetric_eigen(share);
     // A block that alone carries a direction leaves nothing to estimate its error from; the cap keeps the sum finite and the
     // degrees of freedom then say how little is known.
-    const Eigen::VectorXd stretch = (1.0 - own.eigenvalues().array()).max(1e-3).rsqrt();
+    const Eigen::VectorXd stretch = (1.0 - own.values.array()).max(1e-3).rsqrt();
     const Eigen::MatrixXd adjust =
-        root * own.eigenvectors() * stretch.asDiagonal() * own.eigenvectors().transpose() * inverse_root;
+        root * own.vectors * stretch.asDiagonal() * own.vectors.transpose() * inverse_root;
     const Eigen::VectorXd score = adjust * block.score;
     meat += score * score.transpose();
     // Bell–McCaffrey: with white noise the quadratic form of parameter k has the matrix D − PᵀP over blocks.

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/calibrate.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/step_noise.hpp"
 
 namespace isac::estimate {
@@ -111,8 +111,8 @@ MiddleCalibration calibrate_middle(std::span<const MiddleApproach> approaches, c
     if (shift) X(i, 1) = rest.delta_pressure / kPascalPerKgfCm2;  // of order one beside the other columns
     if (sides) X(i, side_column) = rest.side > 0 ? 0.5 : -0.5;
   }
-  const Eigen::MatrixXd inverse = (X.transpose() * X).inverse();
-  const Eigen::VectorXd solution = X.colPivHouseholderQr().solve(y);
+  const Eigen::MatrixXd inverse = inverse_square(X.transpose() * X);
+  const Eigen::VectorXd solution = least_squares(X, y);
   const double dof = static_cast<double>(n - columns);
   const double scatter = (y - X * solution).squaredNorm() / std::max(1.0, dof) + kCountVariance;
   const auto error = [&](Eigen::Index k) { return std::sqrt(scatter * inverse(k, k)); };

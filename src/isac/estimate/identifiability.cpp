@@ -1,9 +1,9 @@
 #include "isac/estimate/identifiability.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "isac/estimate/linear_algebra.hpp"
 
 namespace isac::estimate {
 namespace {
@@ -25,7 +25,7 @@ Eigen::MatrixXd unit_diagonal(const Eigen::MatrixXd& gram) {
 }  // namespace
 
 Eigen::VectorXd variance_inflation(const Eigen::MatrixXd& gram) {
-  return unit_diagonal(gram).inverse().diagonal();
+  return inverse_square(unit_diagonal(gram)).diagonal();
 }
 
 Rank find_rank(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& excess) {
@@ -45,9 +45,9 @@ Rank find_rank(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& excess) {
   // Combinations: null directions of the matrix with unit diagonal. 1e-10 is what rounding leaves of an exact zero there
   // (rows · 1e-16), and a combination that differs from zero by 1e-5 of its columns.
   while (out.kept.size() > 1) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit_diagonal(select(gram, out.kept)));
-    if (eigen.eigenvalues()[0] > 1e-10) break;
-    const Eigen::VectorXd direction = eigen.eigenvectors().col(0);
+    const SymmetricEigen eigen = symmetric_eigen(unit_diagonal(select(gram, out.kept)));
+    if (eigen.values[0] > 1e-10) break;
+    const Eigen::VectorXd direction = eigen.vectors.col(0);
     std::vector<int> involved;
     for (Eigen::Index j = 0; j < direction.size(); ++j)
       if (std::abs(direction[j]) > 0.1) involved.push_back(out.kept[static_cast<std::size_t>(j)]);
@@ -63,7 +63,7 @@ Rank find_rank(const Eigen::MatrixXd& gram, const Eigen::MatrixXd& excess) {
     const Eigen::MatrixXd seen = select(gram, out.kept), noise = select(excess, out.kept);
     const Eigen::VectorXd scale = seen.diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd unit = scale.asDiagonal() * seen * scale.asDiagonal();
-    const Eigen::MatrixXd inverse = unit.inverse();
+    const Eigen::MatrixXd inverse = inverse_square(unit);
     const Eigen::MatrixXd noise_unit = scale.asDiagonal() * noise * scale.asDiagonal();
     int worst = -1;
     double share = 0.5;

@@ -1,11 +1,11 @@
 #include "isac/estimate/joint_core.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "isac/estimate/block_covariance.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/robust.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -71,7 +71,8 @@ Eigen::VectorXd linear_start(const RobustProblem& problem, const std::vector<dou
     if (problem.excess.size() > 0) gram -= problem.excess.topLeftCorner(linear, linear);
     const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
     const Eigen::MatrixXd unit = scale.asDiagonal() * gram * scale.asDiagonal();
-    theta.head(linear) = scale.cwiseProduct(unit.ldlt().solve(scale.cwiseProduct(pass.moment.head(linear))));
+    theta.head(linear) =
+        scale.cwiseProduct(solve_symmetric(unit, scale.cwiseProduct(pass.moment.head(linear))));
   }
   return theta;
 }
@@ -255,7 +256,7 @@ JointCore estimate_joint(const JointRows& rows, JointTerms& terms, const JointFi
       Eigen::VectorXd moment(size);
       for (int k = 0; k < size; ++k) moment[k] = plain.moment[kept[static_cast<std::size_t>(k)]];
       const Eigen::MatrixXd unit = root.asDiagonal() * gram * root.asDiagonal();
-      start = root.cwiseProduct(unit.ldlt().solve(root.cwiseProduct(moment)));
+      start = root.cwiseProduct(solve_symmetric(unit, root.cwiseProduct(moment)));
     }
     if (robust && fixed_scale) {
       problem.kind = options.loss.kind;

@@ -1,10 +1,10 @@
 #include "isac/estimate/joint_rows.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/series/differentiate.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -195,7 +195,7 @@ Eigen::VectorXd pilot_fit(const std::vector<RunColumns>& runs, std::size_t terms
   for (int round = 0; round < 6; ++round) {
     Eigen::MatrixXd normal = x.transpose() * weight.asDiagonal() * x;
     normal.diagonal().array() += 1e-10;  // still columns stay at zero
-    theta = normal.ldlt().solve(x.transpose() * weight.cwiseProduct(y));
+    theta = solve_symmetric(normal, x.transpose() * weight.cwiseProduct(y));
     const Eigen::VectorXd residual = y - x * theta;
     const double bend =
         1.345 * series::robust_deviation({residual.data(), static_cast<std::size_t>(n)}, true);

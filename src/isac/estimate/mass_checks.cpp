@@ -1,10 +1,9 @@
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/mass_problem.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -68,12 +67,12 @@ struct Score {
 void check_unmodelled(const MassProblem& problem, const Eigen::VectorXd& values, const MassState& state,
                       MassFit& fit) {
   const auto own = static_cast<double>(static_cast<Eigen::Index>(problem.unknowns.size()) - problem.priors());
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(state.jacobian);
   const std::vector<Candidate> all = candidates(problem, values);
   std::vector<Score> scores;
   fit.sensitivities.clear();
   for (const Candidate& candidate : all) {
-    const Eigen::VectorXd moved = qr.solve(candidate.column);  // what the fit makes of one unit of the error
+    const Eigen::VectorXd moved =
+        least_squares(state.jacobian, candidate.column);  // what the fit makes of one unit of the error
     const Eigen::VectorXd rest = candidate.column - state.jacobian * moved;
     MassSensitivity sensitivity{candidate.cause, candidate.unit, std::vector<double>(fit.masses.size(), 0)};
     for (std::size_t k = 0; k < problem.unknowns.size(); ++k) {

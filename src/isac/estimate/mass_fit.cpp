@@ -1,12 +1,11 @@
 #include "isac/estimate/mass_fit.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 
 #include "isac/core/error.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/mass_problem.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -24,7 +23,7 @@ MassState mass_state(const MassProblem& problem, const Eigen::VectorXd& values) 
   }
   out.freedom -= static_cast<long>(problem.unknowns.size()) - problem.priors();
   const Eigen::MatrixXd gram = out.jacobian.transpose() * out.jacobian;
-  out.covariance = gram.ldlt().solve(Eigen::MatrixXd::Identity(gram.rows(), gram.cols()));
+  out.covariance = inverse_symmetric(gram);
   return out;
 }
 
@@ -124,7 +123,7 @@ double condition_of(const MassProblem& problem, const MassState& state) {
       regressors(i, static_cast<Eigen::Index>(c)) =
           state.jacobian(i, columns[c]) * problem.data[static_cast<std::size_t>(i)].noise;
   if (columns.empty() || columns.size() < problem.arm.mass_names.size()) return std::nan("");
-  const Eigen::VectorXd s = Eigen::JacobiSVD<Eigen::MatrixXd>(regressors).singularValues();
+  const Eigen::VectorXd s = singular_values(regressors);
   return s[0] / s[s.size() - 1];
 }
 
@@ -300,11 +299,8 @@ void Fitter::conclude() {
                           prior = state_.jacobian.bottomRows(state_.jacobian.rows() - rows);
     const Eigen::MatrixXd information = measured.transpose() * measured / factor;
     const Eigen::Index own = n - problem_.priors();  // the unknowns without prior come first
-    const auto inverse = [](const Eigen::MatrixXd& m) {
-      return Eigen::MatrixXd(m.ldlt().solve(Eigen::MatrixXd::Identity(m.rows(), m.cols())));
-    };
-    const Eigen::MatrixXd total = inverse(information + prior.transpose() * prior);
-    const Eigen::MatrixXd random = inverse(information.topLeftCorner(own, own));
+    const Eigen::MatrixXd total = inverse_symmetric(information + prior.transpose() * prior);
+    const Eigen::MatrixXd random = inverse_symmetric(information.topLeftCorner(own, own));
     const double reach =
         fit_.noise_estimated ? series::student_t_limit(0.95, static_cast<double>(state_.freedom)) : kTwoSided;
     for (Eigen::Index k = 0; k < own; ++k) {

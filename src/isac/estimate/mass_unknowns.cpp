@@ -1,8 +1,8 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "isac/estimate/identifiability.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/mass_problem.hpp"
 
 namespace isac::estimate {
@@ -108,7 +108,7 @@ MassChoice choose_unknowns(MassProblem& problem, const MassFitOptions& options) 
   Eigen::VectorXd values = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem.unknowns.size()));
   if (values.size() > 0) {
     problem.linearise(values, jacobian, residual);
-    values = jacobian.colPivHouseholderQr().solve(residual);
+    values = least_squares(jacobian, residual);
   }
   const std::vector<MassUnknown> wanted = asked_for(problem, options);
   for (const MassUnknown& unknown : wanted) {
@@ -125,7 +125,7 @@ MassChoice choose_unknowns(MassProblem& problem, const MassFitOptions& options) 
     bool alone = column.norm() > 0;
     std::vector<std::string> partners;
     if (alone && jacobian.cols() > 0) {
-      const Eigen::VectorXd made_of = jacobian.colPivHouseholderQr().solve(column);
+      const Eigen::VectorXd made_of = least_squares(jacobian, column);
       alone = (column - jacobian * made_of).norm() > kAloneShare * column.norm();
       for (Eigen::Index k = 0; k < made_of.size(); ++k)
         if (jacobian.col(k).norm() * std::abs(made_of[k]) > 0.05 * column.norm())

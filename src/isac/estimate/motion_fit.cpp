@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -12,6 +11,7 @@
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/estimate/block_covariance.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/motion_pass.hpp"
 #include "isac/estimate/motion_start.hpp"
 #include "isac/series/statistics.hpp"
@@ -74,15 +74,15 @@ class RunCost final : public ceres::CostFunction {
       moment[i] = sums_.moment[i] * lane_scale(i);
       for (int j = 0; j < n; ++j) gram(i, j) = sums_.gram[i][j] * lane_scale(i) * lane_scale(j);
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, n, n>> eigen(gram);
-    if (eigen.info() != Eigen::Success) return false;
-    Eigen::Matrix<double, n, 1> root = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
-    Eigen::Matrix<double, n, 1> r = eigen.eigenvectors().transpose() * moment;
+    const SymmetricEigen eigen = symmetric_eigen(gram);
+    if (!eigen.converged) return false;
+    Eigen::Matrix<double, n, 1> root = eigen.values.cwiseMax(0.0).cwiseSqrt();
+    Eigen::Matrix<double, n, 1> r = eigen.vectors.transpose() * moment;
     const double smallest = 1e-14 * root.maxCoeff();
     for (int i = 0; i < n; ++i) r[i] = root[i] > smallest ? r[i] / root[i] : 0.0;
     Eigen::Map<Eigen::Matrix<double, n, 1>>(residuals, n) = r;
     residuals[n] = std::sqrt(std::max(0.0, sums_.square - r.squaredNorm()));
-    const Eigen::Matrix<double, n, n> slope = -(root.asDiagonal() * eigen.eigenvectors().transpose());
+    const Eigen::Matrix<double, n, n> slope = -(root.asDiagonal() * eigen.vectors.transpose());
     if (jacobians[0] != nullptr) {
       Eigen::Map<Eigen::Matrix<double, kResidualSize, kMotionParameters, Eigen::RowMajor>> out(jacobians[0]);
       out.setZero();
@@ -361,12 +361,12 @@ MotionFit fit_motion(std::span<const MotionRun> runs, const MotionOptions& optio
   const Eigen::VectorXd diagonal = information.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd unit =
       diagonal.cwiseInverse().asDiagonal() * information * diagonal.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit);
+  const SymmetricEigen eigen = symmetric_eigen(unit);
   std::vector<bool> refused(kCount, false);
   for (Eigen::Index k = 0; k < size; ++k) {
-    if (eigen.eigenvalues()[k] > 1e-9) continue;
+    if (eigen.values[k] > 1e-9) continue;
     for (std::size_t a = 0; a < free.size(); ++a) {
-      if (std::abs(eigen.eigenvectors()(static_cast<Eigen::Index>(a), k)) > 0.1) refused[free[a]] = true;
+      if (std::abs(eigen.vectors(static_cast<Eigen::Index>(a), k)) > 0.1) refused[free[a]] = true;
     }
   }
   // What is refused is held, so that the others keep their errors.

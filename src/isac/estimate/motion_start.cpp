@@ -1,11 +1,11 @@
 #include "isac/estimate/motion_start.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/series/differentiate.hpp"
 
 namespace isac::estimate::motion {
@@ -91,10 +91,9 @@ std::pair<double, MotionVector> fit_on_derivatives(std::span<const Prepared> run
     gram = gram.selfadjointView<Eigen::Lower>();
     const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt();
     const Eigen::MatrixXd unit = scale.cwiseInverse().asDiagonal() * gram * scale.cwiseInverse().asDiagonal();
-    const Eigen::VectorXd theta = (unit + 1e-10 * Eigen::MatrixXd::Identity(size, size))
-                                      .ldlt()
-                                      .solve(moment.cwiseQuotient(scale))
-                                      .cwiseQuotient(scale);
+    const Eigen::VectorXd theta =
+        solve_symmetric(unit + 1e-10 * Eigen::MatrixXd::Identity(size, size), moment.cwiseQuotient(scale))
+            .cwiseQuotient(scale);
     error -= 2 * theta.dot(moment) - theta.dot(gram * theta);
     for (Eigen::Index a = 0; a < size; ++a) start[open[static_cast<std::size_t>(a)]] = theta[a];
   }

@@ -2,9 +2,10 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+
+#include "isac/estimate/linear_algebra.hpp"
 
 namespace isac::estimate {
 namespace {
@@ -112,12 +113,11 @@ void set_errors(const MuscleModelEntry& model, const std::vector<PreparedRun>& r
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt();
   const Eigen::MatrixXd scaled =
       scale.cwiseInverse().asDiagonal() * information * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const SymmetricEigen eigen = symmetric_eigen(scaled);
   constexpr double kSingular = 1e-12;  // of the largest eigenvalue, unit diagonal
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[0] > kSingular * eigen.eigenvalues()[n - 1]))
-    return;
+  if (!eigen.converged || !(eigen.values[0] > kSingular * eigen.values[n - 1])) return;
   const Eigen::MatrixXd bread =
-      scale.cwiseInverse().asDiagonal() * scaled.inverse() * scale.cwiseInverse().asDiagonal();
+      scale.cwiseInverse().asDiagonal() * inverse_square(scaled) * scale.cwiseInverse().asDiagonal();
   const double small_sample = groups > 1 ? static_cast<double>(groups) / (groups - 1) : 1.0;
   const Eigen::MatrixXd covariance = small_sample * bread * scores * scores.transpose() * bread;
   for (std::size_t k = 0; k < free.size(); ++k) {

@@ -2,13 +2,13 @@
 
 #include <nlopt.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#include "isac/estimate/linear_algebra.hpp"
 
 namespace isac::estimate {
 namespace {
@@ -66,15 +66,15 @@ class Designer {
 
   /// The lower the better; infinite where the masses cannot be told.
   [[nodiscard]] double criterion(const Matrix& sum) const {
-    const Eigen::LLT<Matrix> factor(sum);
-    if (factor.info() != Eigen::Success) return kInfinity;
-    const Matrix root = factor.matrixL();
+    const Cholesky factor = cholesky(sum);
+    if (!factor.positive) return kInfinity;
+    const Matrix& root = factor.lower;
     if (options_.criterion == DesignCriterion::kD) {
       double logarithm = 0;
       for (Eigen::Index k = 0; k < root.rows(); ++k) logarithm -= 2 * std::log(root(k, k));
       return logarithm;
     }
-    const Matrix inverse = factor.solve(Matrix::Identity(sum.rows(), sum.cols()));
+    const Matrix inverse = inverse_symmetric(sum);
     double trace = 0;
     for (Eigen::Index k = 0; k < inverse.rows(); ++k) {
       const double size = arm_.chain.masses[static_cast<std::size_t>(k)].mass;
@@ -118,9 +118,9 @@ class Designer {
   }
   [[nodiscard]] std::vector<double> errors_of(const Matrix& sum) const {
     std::vector<double> out(static_cast<std::size_t>(masses_), kInfinity);
-    const Eigen::LLT<Matrix> factor(sum);
-    if (factor.info() != Eigen::Success) return out;
-    const Matrix inverse = factor.solve(Matrix::Identity(masses_, masses_));
+    const Cholesky factor = cholesky(sum);
+    if (!factor.positive) return out;
+    const Matrix inverse = inverse_symmetric(sum);
     for (std::size_t k = 0; k < out.size(); ++k)
       out[k] = std::sqrt(inverse(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)));
     return out;
@@ -272,7 +272,7 @@ PoseDesign design_poses(const MassArm& arm, const PoseDesignOptions& options) {
   design.std_errors = designer.errors_of(sum);
   if (!options.recorded.empty()) design.with_recorded = designer.errors_of(sum + recorded);
   design.random_std_errors = designer.random_errors();
-  const Eigen::VectorXd eigen = Eigen::SelfAdjointEigenSolver<Matrix>(sum).eigenvalues();
+  const Eigen::VectorXd eigen = symmetric_eigen(sum).values;
   design.condition = std::sqrt(eigen[eigen.size() - 1] / std::max(eigen[0], 0.0));
   return design;
 }

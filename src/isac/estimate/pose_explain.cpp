@@ -1,12 +1,11 @@
 #include "isac/estimate/pose_explain.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
 
 #include "isac/core/error.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/pose_hypotheses.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -24,6 +23,7 @@ constexpr double kReading = 0.001;      // of the gain of a second parameter, to
 constexpr double kGross = 1e-4;         // of a pose that no hypothesis explains, over all poses
 constexpr double kMostLeftOut = 0.2;    // of the poses
 constexpr double kAssumed = 0.1;        // N m, where nothing is told and nothing left over (seed 3.4)
+constexpr double kDependent = 1e-6;     // pivot, of the largest: columns that others make up
 constexpr long kFewest = 8;             // torques left over, to estimate noise from
 constexpr double kTwoSided = 1.959964;
 constexpr const char* kLoadName = "a load in the hand";
@@ -113,7 +113,7 @@ class Explainer {
   bool told_ = false;
   Vector masses_, residual_, white_residual_;
   Matrix nuisances_;
-  Eigen::LLT<Matrix> root_;
+  Cholesky root_;
   std::vector<PoseHypothesis> hypotheses_;
   std::vector<Tried> tried_;
   double freedom_ = 0, rank_ = 0,
@@ -141,14 +141,11 @@ void Explainer::settle_noise() {
     }
     for (Eigen::Index c = 0; c < columns; ++c)
       if (all.col(c).norm() > 0) all.col(c).normalize();
-    Eigen::ColPivHouseholderQR<Matrix> qr(all);
-    qr.setThreshold(1e-6);
-    const Eigen::Index rank = qr.rank();
-    const Matrix basis = qr.householderQ() * Matrix::Identity(rows + priors, rank);
+    const Matrix basis = column_basis(all, kDependent);
     Vector longer = Vector::Zero(rows + priors);
     longer.head(rows) = residual_;
     const Vector left = longer - basis * (basis.transpose() * longer);
-    rank_ = static_cast<double>(rank - priors);
+    rank_ = static_cast<double>(basis.cols() - priors);
     freedom_ = static_cast<double>(rows) - rank_;
     rich_ = left.squaredNorm();
     if (freedom_ < static_cast<double>(kFewest)) {
@@ -210,8 +207,8 @@ bool Explainer::leave_out_worst(const Vector& left, const Matrix& basis, double 
 void Explainer::whiten() {
   take_hypotheses();  // over the noise as it is now known
   const Eigen::Index n = residual_.size();
-  root_.compute(Matrix::Identity(n, n) + nuisances_ * nuisances_.transpose());
-  white_residual_ = root_.matrixL().solve(residual_);
+  root_ = cholesky(Matrix::Identity(n, n) + nuisances_ * nuisances_.transpose());
+  white_residual_ = root_.whiten(residual_);
   chi_square_ = white_residual_.squaredNorm();
 }
 
@@ -223,10 +220,10 @@ Tried Explainer::fit(const PoseHypothesis& h) const {
   Matrix columns = h.columns;
   const int turns = h.is_zero ? 20 : 1;
   for (int turn = 0; turn < turns; ++turn) {
-    const Matrix white = root_.matrixL().solve(columns);
-    const Vector step = white.colPivHouseholderQr().solve(root_.matrixL().solve(t.left));
+    const Matrix white = root_.whiten_each(columns);
+    const Vector step = least_squares(white, root_.whiten(t.left));
     t.beta += step;
-    t.covariance = (white.transpose() * white).ldlt().solve(Matrix::Identity(columns.cols(), columns.cols()));
+    t.covariance = inverse_symmetric(white.transpose() * white);
     if (!h.is_zero) {
       t.left -= columns * step;
       break;
@@ -236,7 +233,7 @@ Tried Explainer::fit(const PoseHypothesis& h) const {
     columns.col(0) = column;
     if (std::abs(step[0]) < 1e-6) break;
   }
-  t.chi_square = root_.matrixL().solve(t.left).squaredNorm();
+  t.chi_square = root_.whiten(t.left).squaredNorm();
   t.score = t.chi_square + static_cast<double>(t.beta.size()) * std::log(static_cast<double>(t.left.size()));
   return t;
 }
@@ -245,11 +242,9 @@ void Explainer::try_all() {
   double largest = 0;
   for (const MassDatum& row : problem_.data) largest = std::max(largest, std::abs(row.gravity));
   for (const PoseHypothesis& h : hypotheses_) {
-    const Matrix white = root_.matrixL().solve(h.columns);
-    Eigen::ColPivHouseholderQR<Matrix> qr(white);
-    qr.setThreshold(1e-6);
+    const Matrix white = root_.whiten_each(h.columns);
     const double seen = white.col(0).norm() * plausible(h, problem_, largest);
-    if (!(seen > std::sqrt(kApart)) || qr.rank() < white.cols()) {
+    if (!(seen > std::sqrt(kApart)) || column_basis(white, kDependent).cols() < white.cols()) {
       if (h.columns.cols() == 1) out_.not_testable.push_back(h.name);
       continue;
     }
@@ -310,10 +305,9 @@ PoseFinding Explainer::finding(const Tried& t) const {
 /// Masses that would leave the same torques: only their own identification rules them out.
 void Explainer::find_lookalikes(const Tried& best) {
   if (options_.doubt_masses || best.beta.size() != 1) return;
-  const Vector mine = root_.matrixL().solve(best.hypothesis->columns.col(0));
+  const Vector mine = root_.whiten(best.hypothesis->columns.col(0));
   for (std::size_t k = 0; k < problem_.arm.mass_names.size(); ++k) {
-    const Vector other =
-        root_.matrixL().solve(problem_.column({MassUnknown::Kind::kMass, k, "", "kg"}, masses_));
+    const Vector other = root_.whiten(problem_.column({MassUnknown::Kind::kMass, k, "", "kg"}, masses_));
     if (std::abs(mine.dot(other)) > kAlike * mine.norm() * other.norm())
       out_.lookalikes.push_back(problem_.arm.mass_names[k]);
   }

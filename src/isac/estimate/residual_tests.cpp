@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::estimate {
@@ -112,7 +112,7 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, const FittedRows
   const Eigen::VectorXd scale = x.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd unit = x * scale.asDiagonal();
   const Eigen::MatrixXd weighted = w.asDiagonal() * unit;
-  const Eigen::LDLT<Eigen::MatrixXd> normal(unit.transpose() * weighted);
+  const Eigen::MatrixXd normal = unit.transpose() * weighted;
 
   const auto column = [&](auto&& f) {
     std::vector<double> values(index.size());
@@ -188,7 +188,7 @@ std::vector<ResidualTest> residual_tests(const JointRows& rows, const FittedRows
       const Eigen::Map<const Eigen::VectorXd> z(candidate.values.data(), n);
       const double before = z.norm();
       if (!std::isfinite(before) || before == 0) continue;
-      const Eigen::VectorXd rest = z - unit * normal.solve(weighted.transpose() * z);
+      const Eigen::VectorXd rest = z - unit * solve_symmetric(normal, weighted.transpose() * z);
       if (rest.norm() < 1e-4 * before) continue;  // the model already has it
       Eigen::VectorXd score = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(blocks.size()));
       for (Eigen::Index i = 0; i < n; ++i)

@@ -2,12 +2,12 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/robust_pass.hpp"
 
 namespace isac::estimate {
@@ -46,15 +46,15 @@ class CompressedCost final : public ceres::CostFunction {
     // A flat direction (a nonlinear parameter without effect at this point) must not stop the factorisation.
     for (int k = 0; k < n; ++k)
       if (!(normal(k, k) > 0)) normal(k, k) = 1.0;
-    const Eigen::LLT<Eigen::MatrixXd> factor(normal);
-    if (factor.info() != Eigen::Success || !std::isfinite(cost)) return false;
-    const Eigen::VectorXd compressed = factor.matrixL().solve(gradient);
+    const Cholesky factor = cholesky(normal);
+    if (!factor.positive || !std::isfinite(cost)) return false;
+    const Eigen::VectorXd compressed = factor.whiten(gradient);
     Eigen::Map<Eigen::VectorXd>(residuals, n) = compressed;
     residuals[n] = std::sqrt(std::max(0.0, cost - compressed.squaredNorm()));
     if (jacobians != nullptr && jacobians[0] != nullptr) {
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
       Eigen::Map<RowMajor> jacobian(jacobians[0], n + 1, n);
-      jacobian.topRows(n) = factor.matrixU();
+      jacobian.topRows(n) = factor.lower.transpose();
       jacobian.row(n).setZero();
     }
     return true;
@@ -85,7 +85,7 @@ void newton(const RobustProblem& problem, Eigen::VectorXd& theta) {
     Eigen::VectorXd descent = here.moment;
     if (problem.excess.size() > 0) descent += problem.excess * theta;
     const bool by_gram = here.curvature.size() == 0;
-    Eigen::LLT<Eigen::MatrixXd> factor(less_excess(problem, by_gram ? here.gram : here.curvature));
+    Cholesky factor = cholesky(less_excess(problem, by_gram ? here.gram : here.curvature));
     const double before = value_of(problem, here, theta);
     Eigen::VectorXd move, next = theta;
     Pass there;
@@ -97,10 +97,10 @@ void newton(const RobustProblem& problem, Eigen::VectorXd& theta) {
       there = problem.pass(next, 0, problem.rows, false, !squared);
       descends = value_of(problem, there, next) <= before + 1e-13 * std::abs(before);
     };
-    if (factor.info() == Eigen::Success) try_step();
+    if (factor.positive) try_step();
     if (!descends && !by_gram) {
-      factor.compute(less_excess(problem, problem.pass(theta, 0, problem.rows, true, false).gram));
-      if (factor.info() == Eigen::Success) try_step();
+      factor = cholesky(less_excess(problem, problem.pass(theta, 0, problem.rows, true, false).gram));
+      if (factor.positive) try_step();
     }
     if (!descends) return;
     theta = next;

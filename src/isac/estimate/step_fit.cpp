@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <utility>
 

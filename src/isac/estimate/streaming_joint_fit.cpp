@@ -1,6 +1,5 @@
 #include "isac/estimate/streaming_joint_fit.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include "isac/estimate/block_covariance.hpp"
 #include "isac/estimate/joint_core.hpp"
 #include "isac/estimate/joint_verdict.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/estimate/robust.hpp"
 #include "isac/estimate/row_recipe.hpp"
 
@@ -394,7 +394,7 @@ JointFit StreamingJointFit::finish() {
   }
   const Eigen::VectorXd scale = gram.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd unit = scale.asDiagonal() * bread * scale.asDiagonal();
-  const Eigen::VectorXd step = scale.cwiseProduct(unit.ldlt().solve(scale.cwiseProduct(score)));
+  const Eigen::VectorXd step = scale.cwiseProduct(solve_symmetric(unit, scale.cwiseProduct(score)));
   std::vector<BlockSums> sums;
   for (const OpenBlock& block : s.blocks)
     sums.push_back({scale.cwiseProduct(block.sums.score - block.sums.curvature * step),

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::estimate {
@@ -142,7 +142,7 @@ VelocityCut velocity_cut(const JointRows& rows, const JointTerms& terms, const E
   }
   const Eigen::Vector3d scale = x.colwise().norm().cwiseInverse();
   x = x * scale.asDiagonal();
-  const Eigen::Matrix3d inverse = (x.transpose() * x).inverse();
+  const Eigen::Matrix3d inverse = inverse_square(x.transpose() * x);
   if (!inverse.allFinite() || inverse.diagonal().maxCoeff() > 1e6) {
     refuse("all passages have the same speed; record passages from slow to 6.28 rad/s");
     return cut;

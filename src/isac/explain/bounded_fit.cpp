@@ -1,9 +1,10 @@
 #include "isac/explain/bounded_fit.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "isac/estimate/linear_algebra.hpp"
 
 namespace isac::explain {
 
@@ -30,7 +31,7 @@ Eigen::VectorXd bounded_quadratic(const Eigen::MatrixXd& H, const Eigen::VectorX
           if (at(j) != 0) right[a] -= H(i, j) * d[j];
         for (Eigen::Index b = 0; b < m; ++b) h(a, b) = H(i, free[static_cast<std::size_t>(b)]);
       }
-      const Eigen::VectorXd solution = h.ldlt().solve(right);
+      const Eigen::VectorXd solution = estimate::solve_symmetric(h, right);
       if (!solution.allFinite()) return d;
       for (Eigen::Index a = 0; a < m; ++a) target[free[static_cast<std::size_t>(a)]] = solution[a];
     }

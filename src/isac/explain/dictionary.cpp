@@ -1,10 +1,10 @@
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <iterator>
 
 #include "isac/core/units.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
@@ -271,7 +271,7 @@ Eigen::VectorXd beside_generic_functions(const Prepared& data, const Eigen::Vect
     // Nearly dependent functions, and those that the data does not move, must not blow up.
     Eigen::MatrixXd gram = x.transpose() * x;
     for (Eigen::Index c = 0; c < gram.cols(); ++c) gram(c, c) = gram(c, c) * (1 + 1e-6) + 1e-9;
-    left(at) -= x * gram.ldlt().solve(x.transpose() * residual(at));
+    left(at) -= x * estimate::solve_symmetric(gram, x.transpose() * residual(at));
   }
   return left;
 }

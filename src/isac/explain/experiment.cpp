@@ -1,9 +1,9 @@
 #include "isac/explain/experiment.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/experiment_words.hpp"
 #include "isac/explain/workers.hpp"
 
@@ -48,7 +48,7 @@ Eigen::MatrixXd without(const Eigen::MatrixXd& gram, const std::vector<Eigen::In
   Eigen::MatrixXd inner = gram(own, own);
   inner.diagonal().array() += prior;
   const Eigen::MatrixXd cross = gram(own, kept);
-  return gram(kept, kept) - cross.transpose() * inner.ldlt().solve(cross);
+  return gram(kept, kept) - cross.transpose() * estimate::solve_symmetric_each(inner, cross);
 }
 
 std::vector<std::size_t> free_of(const Active& model) {
@@ -158,7 +158,7 @@ bool Designer::suppose_typical() {
       Eigen::MatrixXd inner = recorded_(others, others);
       for (Eigen::Index i = 0; i < inner.rows(); ++i)
         inner(i, i) += 1e-9 * inner(i, i) + prior_[others[static_cast<std::size_t>(i)]];
-      const Eigen::VectorXd cross = recorded_(others, own), follow = inner.ldlt().solve(cross);
+      const Eigen::VectorXd cross = recorded_(others, own), follow = estimate::solve_symmetric(inner, cross);
       const double scale = step_of(model, k),
                    information = std::max(0.0, recorded_(own, own) - cross.dot(follow)) / tie_.noise_unit,
                    deviation = information > 0 ? scale / std::sqrt(information) : kNothing,
@@ -211,7 +211,7 @@ double Designer::one_way(const Information& gram, std::size_t truth, std::size_t
   inner = scale.asDiagonal() * inner * scale.asDiagonal();
   inner.diagonal().array() += 1e-9;
   g = scale.asDiagonal() * g;
-  const double left = norm2 - g.dot(inner.ldlt().solve(g));
+  const double left = norm2 - g.dot(estimate::solve_symmetric(inner, g));
   return std::sqrt(std::max(0.0, left) / tie_.noise_unit);
 }
 

@@ -1,12 +1,12 @@
 #include "isac/explain/quiet_pressure.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <vector>
 
 #include "isac/core/units.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/screen.hpp"
 
 namespace isac::explain {
@@ -27,7 +27,7 @@ Eigen::VectorXd solve(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
   Eigen::MatrixXd gram = scaled.transpose() * scaled;
   gram.diagonal().array() += 1e-6;
-  return norm.cwiseInverse().asDiagonal() * gram.ldlt().solve(scaled.transpose() * y);
+  return norm.cwiseInverse().asDiagonal() * estimate::solve_symmetric(gram, scaled.transpose() * y);
 }
 
 /// Least squares on the columns that the data bear out: the least certain goes, one at a time, until every column but the first (a
@@ -45,14 +45,14 @@ Eigen::VectorXd solve_significant(const Eigen::MatrixXd& x, const Eigen::VectorX
   std::iota(in.begin(), in.end(), 0);
   Eigen::VectorXd beta;
   while (true) {
-    const Eigen::LDLT<Eigen::MatrixXd> factor(gram(in, in));
-    beta = factor.solve(Eigen::VectorXd(right(in)));
+    const Eigen::MatrixXd inner = gram(in, in);
+    beta = estimate::solve_symmetric(inner, right(in));
     const Eigen::MatrixXd part = scaled(Eigen::all, in);
     const Eigen::VectorXd left = y - part * beta;
     Eigen::MatrixXd score = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(block.back()) + 1, part.cols());
     for (Eigen::Index n = 0; n < part.rows(); ++n)
       score.row(static_cast<Eigen::Index>(block[static_cast<std::size_t>(n)])) += left[n] * part.row(n);
-    const Eigen::VectorXd error = factor.solve(score.transpose()).rowwise().norm();
+    const Eigen::VectorXd error = estimate::solve_symmetric_each(inner, score.transpose()).rowwise().norm();
     Eigen::Index least = 0;
     double certain = kErrors;
     for (Eigen::Index c = 1; c < beta.size(); ++c)

@@ -98,6 +98,14 @@ void come_back(const Held& held, const Eigen::MatrixXd& slopes, Eigen::MatrixXd 
 
 }  // namespace
 
+Eigen::VectorXd Around::project(const Eigen::VectorXd& x) const {
+  return x - basis * (basis.transpose() * x);
+}
+
+Eigen::MatrixXd Around::project_columns(const Eigen::MatrixXd& x) const {
+  return x - basis * (basis.transpose() * x);
+}
+
 Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
   if (held.slopes.cols() > 0 && left.allFinite()) come_back(held, held.slopes, held_gram, left);
   return left;

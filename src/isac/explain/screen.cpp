@@ -1,11 +1,11 @@
 #include "isac/explain/screen.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <utility>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/workers.hpp"
 
 namespace isac::explain {
@@ -55,7 +55,7 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
         g(i, j) = gram(use[static_cast<std::size_t>(i)], use[static_cast<std::size_t>(j)]);
       g(i, i) *= 1 + 1e-6;
     }
-    const Eigen::VectorXd a = g.ldlt().solve(s);
+    const Eigen::VectorXd a = estimate::solve_symmetric(g, s);
     bool allowed = a.allFinite();
     for (Eigen::Index i = 0; i < k && allowed; ++i)
       allowed = !positive_only[static_cast<std::size_t>(use[static_cast<std::size_t>(i)])] || a[i] >= 0;

@@ -1,9 +1,9 @@
 #include "isac/explain/uncertainty.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "isac/estimate/block_covariance.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/explanation.hpp"
 #include "isac/series/statistics.hpp"
 
@@ -83,7 +83,7 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
   }
   // The refit may have stopped short of its minimum: only what no parameter can still take is noise.
   const Eigen::VectorXd residual =
-      fit.residual - x * (x.transpose() * x).ldlt().solve(x.transpose() * fit.residual);
+      fit.residual - x * estimate::solve_symmetric(x.transpose() * x, x.transpose() * fit.residual);
   std::vector<estimate::BlockSums> blocks(data.blocks);
   for (auto& block : blocks) {
     block.score = Eigen::VectorXd::Zero(m);

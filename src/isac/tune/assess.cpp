@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
 #include "isac/control/stability.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/simulate/random.hpp"
 
 namespace isac::tune {
@@ -65,8 +65,9 @@ RelativeCovariance independent(const std::array<double, kDrawnParameters>& relat
 std::vector<JointModel> draw_joints(const JointModel& model, const RelativeCovariance& covariance, int count,
                                     std::uint64_t seed) {
   using Matrix = Eigen::Matrix<double, kDrawnParameters, kDrawnParameters, Eigen::RowMajor>;
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Eigen::Map<const Matrix>(covariance.data()));
-  const Matrix root = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const estimate::SymmetricEigen eigen =
+      estimate::symmetric_eigen(Eigen::Map<const Matrix>(covariance.data()));
+  const Matrix root = eigen.vectors * eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   simulate::Random random(seed, 1);
   std::vector<JointModel> joints;
   while (static_cast<int>(joints.size()) < count) {

@@ -1,6 +1,5 @@
 #include "isac/tune/plant_spread.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -8,6 +7,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/estimate/block_covariance.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/tune/linear_step.hpp"
 
 namespace isac::tune {
@@ -66,7 +66,7 @@ Spread spread_of(const PlantProblem& problem, const PlantVector& x, LagForm form
   const estimate::BlockCovariance found = estimate::block_covariance(blocks, prior);
   Eigen::MatrixXd curvature = jacobian.transpose() * jacobian;
   curvature.diagonal() += prior.curvature;
-  const Eigen::MatrixXd white = variance * curvature.ldlt().solve(Eigen::MatrixXd::Identity(m, m));
+  const Eigen::MatrixXd white = variance * estimate::inverse_symmetric(curvature);
   const Eigen::MatrixXd zero = Eigen::MatrixXd::Zero(kPlantUnknowns, kPlantUnknowns);
   Spread spread{zero, zero, Eigen::VectorXd::Ones(kPlantUnknowns)};
   for (Eigen::Index i = 0; i < m; ++i) {
