@@ -9,6 +9,7 @@
 
 #include "isac/explain/explain.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/variable_words.hpp"
 #include "isac/explain/where.hpp"
 #include "tied_data.hpp"
 
@@ -236,6 +237,23 @@ TEST(ChangeSentence, tells_the_change_and_what_it_had_stood_in_for) {
             "C rose from 0.000200 to 0.00260 N m s3.");
   EXPECT_EQ(change_sentence({"C", "N m s3", -0.001, 0.002, ""}, ""),
             "C changed its sign, from -0.00100 to 0.00200 N m s3.");
+}
+
+TEST(VariableWords, call_a_variable_by_the_word_of_its_axis) {
+  EXPECT_EQ(variable_in_words("delta_pressure"), "pressure difference Δp");
+  EXPECT_EQ(variable_in_words("velocity"), "speed φ̇");
+  EXPECT_EQ(variable_in_words("velocity", of_linear_axis("m/s")), "speed v");
+  EXPECT_EQ(variable_name("angle", of_linear_axis("N")), "position");
+  EXPECT_EQ(variable_in_words("time"), "time");
+  Explanation e;
+  e.verdict = Verdict::kUnknown;
+  e.gap.unit = "N m";
+  e.unknown.emplace();
+  e.unknown->depends_on = {"p1", "angle"};
+  const std::string end = "it depends on pressure p1 and angle φ.";
+  EXPECT_TRUE(summary_of(e).ends_with(end)) << summary_of(e);
+  e.gap.unit = "N";
+  EXPECT_TRUE(summary_of(e).ends_with("pressure p1 and position x.")) << summary_of(e);
 }
 
 TEST(WithError, gives_as_many_places_as_the_error_has) {

@@ -7,6 +7,7 @@
 
 #include "isac/explain/labels.hpp"
 #include "isac/explain/uncertainty.hpp"
+#include "isac/explain/variable_words.hpp"
 
 namespace isac::explain {
 namespace {
@@ -226,7 +227,8 @@ std::string summary_of(const Explanation& e) {
             upper_first(joined(terms_of(e.effects, 3))), closing(e));
       }
       if (e.unknown && !e.unknown->depends_on.empty())
-        text += "; it depends on " + joined(e.unknown->depends_on);
+        text += "; it depends on " +
+                joined(variables_in_words(e.unknown->depends_on, of_linear_axis(e.gap.unit)));
       return text + ".";
     }
     case Verdict::kNamed: {

@@ -1,7 +1,7 @@
 /// @file
 /// What chains and subsystems are called and in which unit they are told; numbers as a person would write them.
 ///
-/// Threads: pure. Errors: none. Source: docs/notation.md.
+/// What variables are called: variable_words.hpp. Threads: pure. Errors: none. Source: docs/notation.md.
 #pragma once
 
 #include <string>

@@ -8,6 +8,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/variable_words.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::explain {
@@ -150,10 +151,8 @@ std::string in_words(const Region& region) {
     return region.low < region.high ? "while moving"
            : region.low > 0         ? "moving up"
                                     : (region.high < 0 ? "moving down" : "standing still");
-  const std::string name = region.variable == "delta_pressure"  ? "pressure difference"
-                           : region.variable == "mean_pressure" ? "mean pressure"
-                                                                : region.variable;
-  return fmt::format("at {} from {} to {} {}", name, rounded(region.low), rounded(region.high), region.unit);
+  return fmt::format("at {} from {} to {} {}", variable_name(region.variable, of_linear_axis(region.unit)),
+                     rounded(region.low), rounded(region.high), region.unit);
 }
 
 std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::VectorXd& weight) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "isac/explain/variable_words.hpp"
 #include "isac/report/explain_words.hpp"
 #include "isac/report/text.hpp"
 
@@ -157,13 +158,16 @@ Figure unknown_figure(const Explanation& e) {
   if (!e.unknown || e.unknown->at.empty()) return {};
   const explain::Unknown& u = *e.unknown;
   Figure figure{.id = "unknown",
-                .alt = "Shape of what is missing over " + variable_in_words(u.variable, u.variable_unit),
-                .caption = "What is missing, over " + variable_in_words(u.variable, u.variable_unit) +
+                .alt = "Shape of what is missing over " +
+                       explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit)),
+                .caption = "What is missing, over " +
+                           explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit)) +
                            ": mean of measured less model in bins; the band holds the mean with 95 %."};
-  Panel panel{
-      .x = {.label = upper_first(variable_in_words(u.variable, u.variable_unit)), .unit = u.variable_unit},
-      .y = {.label = "Missing " + u.signal, .unit = u.unit},
-      .lines = {{.at = 0}}};
+  Panel panel{.x = {.label = upper_first(
+                        explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit))),
+                    .unit = u.variable_unit},
+              .y = {.label = "Missing " + u.signal, .unit = u.unit},
+              .lines = {{.at = 0}}};
   std::vector<double> low = u.shape, high = u.shape;
   for (std::size_t i = 0; i < u.band.size() && i < low.size(); ++i) {
     low[i] -= u.band[i];

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "isac/core/error.hpp"
+#include "isac/explain/variable_words.hpp"
 #include "isac/models/effects.hpp"
 #include "isac/report/explain_figures.hpp"
 #include "isac/report/explain_words.hpp"
@@ -195,9 +196,9 @@ void add_unknown(Document& page, const Explanation& e) {
   if (!e.unknown) return;
   page.subheading("An effect without a name");
   const explain::Unknown& u = *e.unknown;
-  std::vector<std::string> on, off;
-  for (const std::string& v : u.depends_on) on.push_back(variable_in_words(v));
-  for (const std::string& v : u.independent) off.push_back(variable_in_words(v));
+  const bool linear = explain::of_linear_axis(e.gap.unit);
+  const std::vector<std::string> on = explain::variables_in_words(u.depends_on, linear);
+  const std::vector<std::string> off = explain::variables_in_words(u.independent, linear);
   std::string text = "It sits in the " + subsystem_in_words(u.subsystem) + " and shows in the " +
                      signal_in_words(u.signal) + ".";
   if (!on.empty())

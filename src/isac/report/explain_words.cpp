@@ -5,6 +5,7 @@
 #include <map>
 #include <vector>
 
+#include "isac/explain/variable_words.hpp"
 #include "isac/report/parameters.hpp"
 #include "isac/report/text.hpp"
 
@@ -55,8 +56,8 @@ std::string unknown(const Explanation& e) {
   std::string text = "Something is missing that is no effect of the catalogue";
   if (!e.unknown) return text + ".";
   text += "; it sits in the " + subsystem_in_words(e.unknown->subsystem);
-  std::vector<std::string> on;
-  for (const std::string& variable : e.unknown->depends_on) on.push_back(variable_in_words(variable));
+  const std::vector<std::string> on =
+      explain::variables_in_words(e.unknown->depends_on, explain::of_linear_axis(e.gap.unit));
   if (!on.empty()) text += " and depends on " + joined(on);
   return text + ".";
 }
@@ -114,10 +115,11 @@ std::string region_sentence(const explain::Region& region) {
   std::string text = subsystem_in_words(region.subsystem) + ", " + signal_in_words(region.signal);
   if (std::isfinite(region.low) && std::isfinite(region.high)) {
     const std::string unit = pretty_unit(region.unit);
-    text += ": " + variable_in_words(region.variable, region.unit) + " from " + number(region.low, 3) +
-            " to " + number(region.high, 3) + (unit.empty() ? "" : " " + unit);
+    text += ": " + explain::variable_in_words(region.variable, explain::of_linear_axis(region.unit)) +
+            " from " + number(region.low, 3) + " to " + number(region.high, 3) +
+            (unit.empty() ? "" : " " + unit);
   } else if (!region.variable.empty()) {
-    text += ": " + variable_in_words(region.variable, region.unit);
+    text += ": " + explain::variable_in_words(region.variable, explain::of_linear_axis(region.unit));
   }
   if (std::isfinite(region.share)) text += " holds " + percent(region.share) + " of what can be explained";
   return text;
@@ -133,24 +135,6 @@ std::string parameters_in_words(const explain::Candidate& candidate) {
 std::string subsystem_in_words(const std::string& subsystem) {
   if (subsystem == "pcu") return "valve unit";
   return subsystem.empty() ? "rig" : subsystem;
-}
-
-std::string variable_in_words(const std::string& variable, const std::string& unit) {
-  if (unit == "m" && variable == "angle") return "position x";
-  if (unit == "m/s" && variable == "velocity") return "speed v";
-  if (unit == "m/s" && variable == "speed") return "speed |v|";
-  static const std::map<std::string, std::string> kWords{{"delta_pressure", "pressure difference Δp"},
-                                                         {"mean_pressure", "mean pressure"},
-                                                         {"p1", "pressure p1"},
-                                                         {"p2", "pressure p2"},
-                                                         {"angle", "angle φ"},
-                                                         {"velocity", "speed φ̇"},
-                                                         {"memory", "what happened before"},
-                                                         {"speed", "speed |φ̇|"},
-                                                         {"direction", "direction of motion"},
-                                                         {"pressure_rate", "rate of the pressures"}};
-  const auto found = kWords.find(variable);
-  return found == kWords.end() ? variable : found->second;
 }
 
 std::string signal_in_words(const std::string& signal) {

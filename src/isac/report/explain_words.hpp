@@ -23,8 +23,6 @@ namespace isac::report {
 [[nodiscard]] std::string parameters_in_words(const explain::Candidate& candidate);
 /// "pcu" → "valve unit".
 [[nodiscard]] std::string subsystem_in_words(const std::string& subsystem);
-/// "delta_pressure" → "Δp"; other words as they are.
-[[nodiscard]] std::string variable_in_words(const std::string& variable, const std::string& unit = {});
 /// "motion" → "motion (I φ̈ = T)".
 [[nodiscard]] std::string signal_in_words(const std::string& signal);
 /// The catalogue's plain letters as a report writes them: "-T_c sgn(w)" → "−T_c sgn(φ̇)".
