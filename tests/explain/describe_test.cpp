@@ -243,7 +243,7 @@ TEST(VariableWords, call_a_variable_by_the_word_of_its_axis) {
   EXPECT_EQ(variable_in_words("delta_pressure"), "pressure difference Δp");
   EXPECT_EQ(variable_in_words("velocity"), "speed φ̇");
   EXPECT_EQ(variable_in_words("velocity", of_linear_axis("m/s")), "speed v");
-  EXPECT_EQ(variable_name("angle", of_linear_axis("N")), "position");
+  EXPECT_EQ(variable_in_words("angle", of_linear_axis("N")), "position x");
   EXPECT_EQ(variable_in_words("time"), "time");
   Explanation e;
   e.verdict = Verdict::kUnknown;

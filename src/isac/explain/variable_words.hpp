@@ -10,8 +10,6 @@
 
 namespace isac::explain {
 
-/// "delta_pressure" → "pressure difference".
-[[nodiscard]] std::string variable_name(const std::string& variable, bool linear_axis = false);
 /// "delta_pressure" → "pressure difference Δp".
 [[nodiscard]] std::string variable_in_words(const std::string& variable, bool linear_axis = false);
 [[nodiscard]] std::vector<std::string> variables_in_words(const std::vector<std::string>& variables,

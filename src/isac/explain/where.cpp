@@ -151,8 +151,9 @@ std::string in_words(const Region& region) {
     return region.low < region.high ? "while moving"
            : region.low > 0         ? "moving up"
                                     : (region.high < 0 ? "moving down" : "standing still");
-  return fmt::format("at {} from {} to {} {}", variable_name(region.variable, of_linear_axis(region.unit)),
-                     rounded(region.low), rounded(region.high), region.unit);
+  return fmt::format("at {} from {} to {} {}",
+                     variable_in_words(region.variable, of_linear_axis(region.unit)), rounded(region.low),
+                     rounded(region.high), region.unit);
 }
 
 std::vector<Region> regions_of(const Prepared& data, Chain chain, const Eigen::VectorXd& weight) {

@@ -157,15 +157,12 @@ std::vector<Figure> run_figures(const Explanation& e, std::size_t most) {
 Figure unknown_figure(const Explanation& e) {
   if (!e.unknown || e.unknown->at.empty()) return {};
   const explain::Unknown& u = *e.unknown;
+  const std::string over = explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit));
   Figure figure{.id = "unknown",
-                .alt = "Shape of what is missing over " +
-                       explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit)),
-                .caption = "What is missing, over " +
-                           explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit)) +
+                .alt = "Shape of what is missing over " + over,
+                .caption = "What is missing, over " + over +
                            ": mean of measured less model in bins; the band holds the mean with 95 %."};
-  Panel panel{.x = {.label = upper_first(
-                        explain::variable_in_words(u.variable, explain::of_linear_axis(u.variable_unit))),
-                    .unit = u.variable_unit},
+  Panel panel{.x = {.label = upper_first(over), .unit = u.variable_unit},
               .y = {.label = "Missing " + u.signal, .unit = u.unit},
               .lines = {{.at = 0}}};
   std::vector<double> low = u.shape, high = u.shape;
