@@ -1,6 +1,7 @@
 // Play and compliance: what the prediction makes of a joint that the encoder does not quite see.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -160,6 +161,58 @@ TEST(Screen, lets_any_shape_of_an_effect_speak_for_it) {
     not_of_most_gain += of_most_gain < T ? 1 : 0;
   }
   EXPECT_GT(not_of_most_gain, 0);
+}
+
+// The search begins with one side, or with both at like shares of the reach; the other side must be found from there.
+TEST(Stops, on_both_sides_come_back_from_a_start_that_has_one) {
+  TiedRig rig;
+  rig.stop_at = 0.12;
+  rig.stop = 1.5;
+  const Bench bench(
+      rig, {by_hand(20, 0.35, 1.0), test::free_in_steps(25, 1.7, 0.6), test::free_in_steps(25, 2.9, 0.6)});
+  const Around place = around(bench.predictor, bench.stem, bench.weights);
+  const Hypothesis* h = bench.find("end_stop");
+  const Refined both = refine(place, *h, {1, 0.14, -3.0});
+  EXPECT_NEAR(both.values[1], rig.stop_at, 0.01);
+  EXPECT_NEAR(both.values[2], -rig.stop_at, 0.01);
+  EXPECT_NEAR(both.values[0], rig.stop, 0.1 * rig.stop);
+}
+
+// A force that goes on falling below zero is read by a sensor that can be pushed: nothing hangs slack, and the rows count.
+TEST(Slack, is_where_a_reading_stays_and_not_where_it_passes_through_zero) {
+  TiedRig rig;
+  rig.common = 40;
+  const PlannedRun wide = test::clamped(20, 0.1, 1.2, 5);
+  const auto loaded = [&] {
+    const Bench bench(rig, {by_hand(20, 0.35, 1.0), wide});
+    const std::vector<unsigned char>& rows = bench.data.runs[1].loaded;
+    return static_cast<double>(std::count(rows.begin(), rows.end(), 1)) / static_cast<double>(rows.size());
+  };
+  EXPECT_GT(loaded(), 0.95);
+  rig.pushes = false;
+  EXPECT_LT(loaded(), 0.8);
+}
+
+// Zeros of both pressure sensors that are off by the same are a valve zero, for all that a recording says.
+TEST(Twins, both_sensors_zeros_stand_beside_a_valve_zero) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
+  const Ranking ranking(bench.data, bench.library);
+  const auto ranked = [&](double apart) {
+    std::vector<Trial> trials(2);
+    trials[0].hypothesis =
+        static_cast<int>(bench.find("pressure_gain_error") - bench.library.hypotheses.data());
+    trials[1].hypothesis = static_cast<int>(bench.find("pressure_offset") - bench.library.hypotheses.data());
+    trials[0].values = {0, 500};
+    trials[1].values = {500, 500};
+    for (Trial& t : trials) t.residual = 0.5 * bench.stem.residual;
+    trials[1].residual += apart * bench.stem.residual;
+    for (Trial& t : trials) t.loss = t.residual.squaredNorm();
+    ranking.rank(trials, bench.stem.residual);
+    EXPECT_EQ(ranking.id_of(trials[0]), "pressure_gain_error");
+    return trials[1].in_set;
+  };
+  EXPECT_TRUE(ranked(0));
+  EXPECT_FALSE(ranked(1));
 }
 
 }  // namespace

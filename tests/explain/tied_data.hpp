@@ -41,6 +41,8 @@ struct TiedRig {
   double hunting = 0;    // Pa by which the valves swing of themselves, at 2.5 Hz
   double threshold = 0;  // Pa that lift a bladder off
   double force_lag = 0, force_most = 1e9;  // s of the amplifiers, N at which they clip
+  bool pushes = true;                      // a muscle that would push is read so; else it hangs slack
+  double stop_at = 0, stop = 0;            // rad, N m/rad of stops on both sides that no force sensor sees
   double known_inertia = 0;                // kg m2 that is believed; 0: the true one
   double zero_wander = 0;  // N m, of the force sensors: from run to run, and with a memory of 100 s within
   double far_inertia = 0, far_hertz = 15, far_damping = 0.05;  // kg m2 of the inertia, behind a compliance
@@ -164,7 +166,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
         zero += -zero * 2e-5 + rig.zero_wander * std::sqrt(4e-5) * gauss(random);  // 500 Hz, 100 s
       const auto read = [&](int i) {
         const double zeros = (i == 0 ? -0.5 : 0.5) * zero / rig.radius;
-        return std::min(rig.force_most, force[i] + zeros + rig.force_noise * gauss(random));
+        const double pull = rig.pushes ? force[i] : std::max(0.0, force[i]);
+        return std::min(rig.force_most, pull + zeros + rig.force_noise * gauss(random));
       };
       const double row[8] = {t,
                              encoder * std::round((seen + rig.encoder_drift * (since_eight + t) +
@@ -200,8 +203,9 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       far_angle += kStep * far_velocity;
     }
     if (free) {  // dry friction holds the joint where no torque overcomes it
+      const double past = rig.stop_at > 0 ? angle - std::clamp(angle, -rig.stop_at, rig.stop_at) : 0;
       const auto driven = [&](double w) {
-        return torque(w) - (w > 0 ? rig.bearing : w < 0 ? -rig.bearing : 0.0);
+        return torque(w) - (w > 0 ? rig.bearing : w < 0 ? -rig.bearing : 0.0) - rig.stop * past;
       };
       const double push = driven(velocity != 0 ? velocity : torque(0) > 0 ? 1e-12 : -1e-12);
       const bool stuck = velocity == 0 && push * torque(0) <= 0;

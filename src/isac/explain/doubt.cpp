@@ -53,18 +53,25 @@ bool closes_little(const Gap& gap) {
 
 bool is_refuted(const Predictor& predictor, const Found& found, const ModelPoint& user, const Proof& proof,
                 Chain chain, const ExplainOptions& options, Gap& gap) {
-  constexpr double kClearly = 3.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
-  constexpr double kAbout = 1.01;                     // where they hardly show the effect, noise decides
+  constexpr double kClearly = 3.0, kHardly = -1.645;    // sigma, freed of what the noise remembers
+  constexpr double kAbout = 1.01;                       // where they hardly show the effect, noise decides
+  constexpr double kLikely = 1.645, kWandersBy = 1.05;  // and a zero that wanders decides by more
   if (found.added.empty() || proof.runs() == 0) return false;
   const bool worse = does_worse(found, proof, chain, gap);
   if (!worse && !closes_little(gap)) return false;
   const Proof::Freed freed = proof.freed(found.model.model, user, found.weights, chain);
   const Colour& colour = found.weights.colour[static_cast<int>(chain)];
-  if ((colour.slow > 0 || colour.wander > 0) && freed.behind.t >= kClearly && freed.first < freed.second) {
+  const bool slow = colour.slow > 0 || colour.wander > 0;
+  if (slow && freed.behind.t >= kClearly && freed.first < freed.second) {
     free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;
   }
   if (!worse || (gap.heldout_after <= kAbout * gap.heldout_before && freed.behind.t >= kHardly)) return false;
+  if (slow && gap.heldout_after <= kWandersBy * gap.heldout_before && freed.behind.t >= kLikely &&
+      freed.first < freed.second) {
+    free_of_slow_noise(predictor.data(), found, freed, chain, gap);
+    return false;
+  }
   const ModelPoint &model = found.model.model, &own = found.baseline.model;
   return proof.freed(model, own, found.weights, chain).behind.t < kClearly ||
          !is_mended_by_raw_effects(predictor, found, proof, chain, options, gap);

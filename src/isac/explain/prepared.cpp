@@ -26,6 +26,13 @@ constexpr double kSlack = 2.0,
 constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
 constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
 
+/// Does what reads less than kSlack lie where nothing pulls? A reading that goes on falling below zero is one of a sensor that is pushed.
+bool hangs_slack(const std::vector<double>& force) {
+  std::vector<double> low;
+  std::copy_if(force.begin(), force.end(), std::back_inserter(low), [](double f) { return f < kSlack; });
+  return !low.empty() && series::median(low) - series::quantile(low, 0.05) < kSlack;
+}
+
 double parse_iso8601(const std::string& text) {
   std::tm tm{};
   double seconds = 0;
@@ -185,7 +192,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   run.usable = std::move(usable);
   run.loaded = run.usable;
   for (const auto& force : run.force) {
-    if (force.empty() || !(series::median(force) > kCarries)) continue;
+    if (force.empty() || !(series::median(force) > kCarries) || !hangs_slack(force)) continue;
     for (std::size_t k = 0; k < n; ++k) {
       if (force[k] >= kSlack) continue;
       for (std::size_t i = k - std::min(k, reach); i < std::min(n, k + reach + 1); ++i) run.loaded[i] = 0;

@@ -56,6 +56,13 @@ bool Ranking::is_against_its_name(const Trial& t) const {
   return id_of(t) == "inertia_error" && t.values[0] < 0;
 }
 
+/// Both sensors' zeros off by the same are what a valve zero is, and as likely: no general case that happens to fit.
+bool Ranking::are_two_causes_of_one(const Trial& general, const Trial& simple) const {
+  return id_of(general) == "pressure_offset" && id_of(simple) == "pressure_gain_error" &&
+         compare(data_, simple.residual, general.residual, 0, noise_density(data_, simple.residual))
+                 .separation < kTwinLimit;
+}
+
 void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const {
   if (trials.empty()) return;
   const auto least = std::min_element(trials.begin(), trials.end(),
@@ -93,7 +100,7 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
   for (Trial& t : trials)
     if (&t != &trials.front() && t.in_set)
       for (const Trial& simple : trials)
-        if (simple.in_set && nests(id_of(t), id_of(simple)) &&
+        if (simple.in_set && nests(id_of(t), id_of(simple)) && !are_two_causes_of_one(t, simple) &&
             (t.behind.t > -kNestedDoubt || is_limit_case(t)))
           t.in_set = false;
   weigh(trials);

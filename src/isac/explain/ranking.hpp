@@ -46,6 +46,7 @@ class Ranking {
   /// friction that is hardly larger at rest is dry friction.
   [[nodiscard]] bool is_limit_case(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
+  [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.
   void rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const;

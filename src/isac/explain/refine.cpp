@@ -121,6 +121,41 @@ Eigen::VectorXd Around::left_beside(const Eigen::Ref<const Eigen::VectorXd>& x) 
   return left;
 }
 
+namespace {
+
+/// A stop that the motion never reaches has no slope: where one stands so, it is set to each angle at which the other hypotheses have theirs,
+/// and the fit goes on from the best.
+void try_other_stop(Projected& problem, const Hypothesis& hypothesis, const Eigen::VectorXd& lower,
+                    const Eigen::VectorXd& upper, const std::vector<double>& scale, int iterations,
+                    Eigen::VectorXd& x, Refined& refined) {
+  constexpr double kWorth = 1e-6;  // of the loss
+  for (Eigen::Index side = 1; side < x.size(); ++side) {
+    const auto i = static_cast<std::size_t>(side);
+    Eigen::VectorXd best = x;
+    best[side] = hypothesis.info().parameters[i].typical > 0 ? upper[side] : lower[side];
+    if (problem.residual_at(best).squaredNorm() > refined.loss * (1 + kWorth)) continue;  // it is reached
+    best = x;
+    double least = refined.loss * (1 - kWorth);
+    for (const Values& shape : hypothesis.shapes) {
+      Eigen::VectorXd tried = x;
+      tried[side] = std::clamp(shape[i] / scale[i], lower[side], upper[side]);
+      const double loss = tried == x ? refined.loss : problem.residual_at(tried).squaredNorm();
+      if (loss >= least) continue;
+      least = loss;
+      best = std::move(tried);
+    }
+    if (best == x) continue;
+    BoundedFit fit =
+        bounded_fit(std::ref(problem), best, lower, upper, {.rounds = iterations, .tolerance = 1e-6});
+    if (fit.residual.size() == 0 || !(fit.residual.squaredNorm() < refined.loss)) continue;
+    x = fit.x;
+    refined.loss = fit.residual.squaredNorm();
+    refined.residual = std::move(fit.residual);
+  }
+}
+
+}  // namespace
+
 Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& start, int iterations) {
   std::vector<std::size_t> free;
   std::vector<double> scale;
@@ -173,6 +208,7 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
       }
     }
   }
+  if (id == "end_stop") try_other_stop(problem, hypothesis, lower, upper, scale, iterations, x, refined);
   refined.values = start;
   for (Eigen::Index j = 0; j < m; ++j)
     refined.values[free[static_cast<std::size_t>(j)]] = x[j] * scale[static_cast<std::size_t>(j)];
