@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "ledger.hpp"
+
 namespace blind {
 namespace {
 
@@ -92,24 +94,30 @@ Answer read_answer(const std::string& text) {
   return a;
 }
 
-/// Power on held-out runs that the answer took away, over the power that the true model would: from where the baseline stood down to
-/// what the same program leaves of the same day with nothing hidden. Without that twin the generator's own baseline has to do.
-double closed_share(const Truth& t, const Answer& a, const std::map<std::string, double>& floor) {
-  if (a.heldout_before <= 0.0 || t.gap.empty()) return -1.0;
-  const double taken = a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after;
-  if (const auto left = floor.find(a.signal); left != floor.end()) {
-    const double open = a.heldout_before * a.heldout_before - left->second * left->second;
-    return open < 0.02 * left->second * left->second ? -1.0 : taken / open;
-  }
-  const std::string signal = a.signal == "motion" ? "balance" : a.signal == "torque" ? "driven" : a.signal;
-  if (!t.gap.contains(signal)) return -1.0;
+/// Power on held-out runs that the answer took away.
+double power_taken(const Answer& a) {
+  return a.heldout_before * a.heldout_before - a.heldout_after * a.heldout_after;
+}
+
+/// `power_taken` over what lies between the baseline and what the same program leaves of the same day with nothing hidden.
+double closed_to_twin(const Answer& a, const std::map<std::string, double>& floor) {
+  const auto left = floor.find(a.signal);
+  if (a.heldout_before <= 0.0 || left == floor.end()) return -1.0;
+  const double open = a.heldout_before * a.heldout_before - left->second * left->second;
+  return open < 0.02 * left->second * left->second ? -1.0 : power_taken(a) / open;
+}
+
+/// `power_taken` over what the generator's own model takes out of these recordings, its parameters and the effect's being the true ones.
+double closed_of_truth(const Truth& t, const Answer& a) {
+  const std::string signal = signal_of_label(a.signal);
+  if (a.heldout_before <= 0.0 || !t.gap.contains(signal)) return -1.0;
   const double gap = t.gap.at(signal), noise = t.gap_noise.at(signal);
   if (gap * gap < 1e-3 * noise * noise)
     return -1.0;  // nothing to close in the signal that the answer speaks of
   const auto closes = t.gap_closes.find(signal);
   const double true_closes = closes != t.gap_closes.end() ? closes->second : gap * gap;
   if (true_closes < 0.2 * gap * gap) return -1.0;  // the recordings' own noise hides it
-  return taken / true_closes;
+  return power_taken(a) / true_closes;
 }
 
 std::map<std::string, double> read_floor(const std::string& text) {
@@ -123,7 +131,12 @@ std::map<std::string, double> read_floor(const std::string& text) {
 
 }  // namespace
 
+std::string signal_of_label(const std::string& signal) {
+  return signal == "motion" ? "balance" : signal == "torque" ? "driven" : signal;
+}
+
 Case read_case(const std::string& line) {
+  if (const std::optional<Case> kept = read_ledger_line(line)) return *kept;
   const json j = json::parse(line, nullptr, false);
   if (j.is_discarded() || !j.contains("label"))
     throw std::runtime_error("not a line of a results file: " + line.substr(0, 60));
@@ -165,7 +178,8 @@ Judgement judge_case(const Case& one) {
   for (const std::string& id : a.alternatives)
     if (!holds(set, id)) set.push_back(id);
   j.set_size = static_cast<int>(set.size());
-  j.closed = closed_share(t, a, one.floor);
+  j.closed_truth = closed_of_truth(t, a);
+  j.closed = one.floor.contains(a.signal) ? closed_to_twin(a, one.floor) : j.closed_truth;
   j.left_unnamed = a.verdict == "unknown" && a.effects.empty();
   const bool one_name = a.verdict == "named" && a.effects.size() == 1 && a.alternatives.empty();
   j.asserted = a.verdict == "named" && !a.effects.empty() && a.alternatives.empty();

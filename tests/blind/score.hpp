@@ -42,7 +42,10 @@ struct Case {
   std::map<std::string, Answer> baselines = {};  ///< by the method's name, of the same dataset
 };
 
-/// One line of a results file of blind_run. Throws std::runtime_error on a line that is none.
+/// The signal of an answer's gap as labels call it.
+std::string signal_of_label(const std::string& signal);
+
+/// One line of a results file of blind_run, or of a ledger. Throws std::runtime_error on a line that is none.
 Case read_case(const std::string& line);
 /// A label file and an answer file.
 Case read_pair(const std::string& label, const std::string& answer);
@@ -55,8 +58,9 @@ struct Judgement {
   bool asserted = false;      ///< named, and nothing beside it says that it might be another
   bool left_unnamed = false, right_variables = false, right_side = false;
   int set_size = 0;
-  double closed =
-      -1;  ///< share of the gap closed on held-out runs, relative to the true model; −1: not known
+  /// Share of the gap closed on held-out runs; −1: not known. `closed`: of what lies above the same day with nothing hidden (without that twin, as
+  /// `closed_truth`); `closed_truth`: of what the generator's own true model closes there.
+  double closed = -1, closed_truth = -1;
 };
 
 Judgement judge_case(const Case& one);

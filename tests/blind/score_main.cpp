@@ -1,9 +1,10 @@
-// blind_score: tables from the results of blind_run, or from label and answer files.
+// blind_score: tables from the results of blind_run, from ledgers, or from label and answer files.
 #include <fstream>
 #include <iostream>
 #include <iterator>
 #include <stdexcept>
 
+#include "ledger.hpp"
 #include "score.hpp"
 
 namespace {
@@ -11,7 +12,9 @@ namespace {
 constexpr const char* kUsage =
     "blind_score RESULTS.jsonl [RESULTS.jsonl …]\n"
     "blind_score --pair LABEL.json ANSWER.json [--pair …]\n"
-    "writes Markdown tables to standard output\n";
+    "blind_score --ledger PROGRAM RESULTS.jsonl [RESULTS.jsonl …]\n"
+    "writes Markdown tables to standard output; with --ledger a short line for each dataset, which says that "
+    "PROGRAM answered\nand is read like results\n";
 
 std::ifstream open_file(const std::string& file) {
   std::ifstream in(file);
@@ -28,8 +31,13 @@ std::string read_text(const std::string& file) {
 
 int main(int count, char** words) {
   std::vector<blind::Case> cases;
+  std::string program;
   try {
     for (int i = 1; i < count; ++i) {
+      if (std::string(words[i]) == "--ledger" && i + 1 < count) {
+        program = words[++i];
+        continue;
+      }
       if (std::string(words[i]) == "--pair" && i + 2 < count) {
         cases.push_back(blind::read_pair(read_text(words[i + 1]), read_text(words[i + 2])));
         i += 2;
@@ -53,6 +61,10 @@ int main(int count, char** words) {
     std::cerr << kUsage;
     return 2;
   }
-  std::cout << blind::report(cases);
+  if (program.empty()) {
+    std::cout << blind::report(cases);
+    return 0;
+  }
+  for (const blind::Case& one : cases) std::cout << blind::ledger_line(one, program) << '\n';
   return 0;
 }

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "ledger.hpp"
+
 namespace blind {
 namespace {
 
@@ -232,6 +234,41 @@ TEST(Score, puts_every_baseline_beside_the_answer_on_the_same_dataset) {
   one.baselines.clear();
   none.baselines.clear();
   EXPECT_TRUE(methods_table({one, none}).empty());
+}
+
+TEST(Ledger, is_scored_as_the_whole_answer_is) {
+  std::vector<Case> cases(5, single("creep"));
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    cases[i].truth.key = "clear/white/creep/1." + std::to_string(i);
+  cases[0].answer = named({"creep"});
+  cases[0].answer.signal = "torque";
+  cases[0].answer.heldout_before = 0.0223;
+  cases[0].answer.heldout_after = 0.0201;
+  cases[0].answer.seconds = 3.25;
+  cases[1] = cases[0];
+  cases[1].floor = {{"torque", 0.02}};
+  cases[1].baselines["B1"] = named({"hysteresis"}, {"creep"});
+  cases[2].truth.nearest_equal = "hysteresis";
+  cases[2].answer = named({"creep"}, {"hysteresis"});
+  cases[3].truth.kind = "none";
+  cases[3].truth.ids = {};
+  cases[3].answer.verdict = "none";
+  cases[3].answer.p_value = 0.25;
+  cases[4].answer.failed = "killed: too slow";
+  std::vector<Case> kept;
+  for (const Case& one : cases) {
+    kept.push_back(read_case(ledger_line(one, "0.1.0")));
+    EXPECT_EQ(judge_case(kept.back()).closed, judge_case(one).closed);
+  }
+  EXPECT_EQ(report(kept), report(cases));
+  EXPECT_NE(report(kept).find("| creep | 4 | 3 |"), std::string::npos) << report(kept);
+  Case untestable = single("leak");
+  untestable.truth.testable = false;
+  EXPECT_FALSE(read_case(ledger_line(untestable, "0.1.0")).truth.testable);
+  EXPECT_THROW(read_case(R"({"key":"k","truth":{"kind":"none","noise":"white"}})"), std::runtime_error);
+  EXPECT_THROW(
+      read_case(R"({"key":"k","truth":{"kind":"none","noise":"white"},"answer":{"effects":["leak"]}})"),
+      std::runtime_error);
 }
 
 }  // namespace
