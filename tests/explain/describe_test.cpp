@@ -197,6 +197,15 @@ TEST(RawEffects, names_hum_and_spikes_that_the_low_passed_rows_cannot_show) {
   EXPECT_NEAR(find("spikes")->parameters[0].value, 0.5 / 731, 1e-4);
   EXPECT_LT(e.gap.heldout_after, e.gap.heldout_before);
   EXPECT_NEAR(e.gap.heldout_after, 0.019 * std::sqrt(2.0) * 0.3, 0.0006);  // the forces' noise alone, and 7 %
+  // Out of the catalogue it has no name, and is there all the same.
+  ExplainOptions without = options_for(rig);
+  without.excluded = {"spikes"};  // the larger of the two
+  const Explanation unnamed = explain(runs, HeldOut(held), without);
+  EXPECT_EQ(unnamed.verdict, Verdict::kUnknown);
+  EXPECT_TRUE(unnamed.detected && unnamed.effects.empty());
+  ASSERT_TRUE(unnamed.unknown.has_value());
+  EXPECT_EQ(unnamed.unknown->signal, "torque");
+  EXPECT_EQ(unnamed.gap.heldout_after, unnamed.gap.heldout_before);
 }
 
 TEST(RawEffects, calls_a_valve_that_hunts_no_disturbance_from_outside) {

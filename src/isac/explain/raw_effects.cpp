@@ -203,6 +203,26 @@ bool valve_hunts(const Predictor& predictor, const ModelPoint& model, const Foun
   return true;
 }
 
+/// What the user took out of the catalogue is there all the same.
+void leave_without_name(const RawEffect& effect, const Label& label, Explanation& e) {
+  e.verdict = Verdict::kUnknown;
+  e.detected = true;
+  e.p_value = std::min(e.p_value, effect.p_value);
+  Unknown unknown;
+  unknown.subsystem = effect.candidate.subsystem;
+  unknown.signal = label.signal;
+  unknown.unit = label.unit;
+  if (std::isfinite(effect.frequency)) {
+    unknown.depends_on = {"time"};
+    unknown.variable = "time";
+    unknown.variable_unit = "s";
+    e.where.push_back(
+        {unknown.subsystem, label.signal, "frequency", effect.frequency, effect.frequency, "Hz", kNotKnown});
+  }
+  e.unknown = std::move(unknown);
+  e.trials.push_back({effect.candidate.id, "found at the recording's rate, and not to be considered"});
+}
+
 double less(double rms, double mean_square) {
   return std::isfinite(rms) ? std::sqrt(std::max(0.0, rms * rms - mean_square)) : rms;
 }
@@ -232,9 +252,10 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
   for (RawEffect& effect : effects) {
     const std::string id = effect.candidate.id;
     const auto is = [&](const Candidate& c) { return c.id == id; };
-    if (std::any_of(e.effects.begin(), e.effects.end(), is) ||
-        std::find(options.excluded.begin(), options.excluded.end(), id) != options.excluded.end())
-      continue;
+    if (std::any_of(e.effects.begin(), e.effects.end(), is)) continue;
+    const bool may_be_named =
+        std::find(options.excluded.begin(), options.excluded.end(), id) == options.excluded.end();
+    if (!may_be_named && !e.effects.empty()) continue;
     const double floor = found.floors.white[static_cast<int>(effect.chain)],
                  told = found.floors.all(effect.chain);
     if (!(effect.rms >= options.material * floor)) continue;
@@ -250,6 +271,10 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
       continue;
     }
     const Label label = label_of(predictor.data(), effect.chain);
+    if (!may_be_named) {
+      leave_without_name(effect, label, e);
+      return;
+    }
     if (e.effects.empty() && e.gap.signal != label.signal) {
       e.gap = {};
       e.gap.signal = label.signal;
