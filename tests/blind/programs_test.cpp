@@ -136,6 +136,18 @@ TEST_F(Programs, say_by_their_exit_code_what_went_wrong) {
   EXPECT_EQ(run("blind_score " + path("nowhere")), 3);
 }
 
+TEST_F(Programs, make_the_tables_that_stand_in_the_documentation_of_what_was_measured) {
+  const std::string root = ISAC_SOURCE_DIR;
+  ASSERT_EQ(run("blind_score " + root + "/tests/blind/measured/*.jsonl"), 0) << text("complaint");
+  std::ifstream in(root + "/docs/explain.md");
+  const std::string page{std::istreambuf_iterator<char>(in), {}};
+  int rows = 0;
+  for (const std::string& line : lines("said"))
+    if (line.starts_with("|") && !line.starts_with("|--") && ++rows > 0)
+      EXPECT_NE(page.find(line + "\n"), std::string::npos) << "docs/explain.md lacks: " << line;
+  EXPECT_GT(rows, 60);
+}
+
 TEST(Blindness, is_kept_no_source_here_includes_anything_of_the_toolkit) {
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(ISAC_SOURCE_DIR "/tests/blind")) {
