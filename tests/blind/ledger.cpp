@@ -69,7 +69,7 @@ json write_answer(const Answer& a) {
   w.add("subsystems", a.subsystems);
   w.add("alternatives", a.alternatives);
   w.add("depends_on", a.depends_on);
-  if (a.p_value >= 0.0) w.object["p_value"] = five_digits(a.p_value);
+  if (a.p_value >= 0.0) w.object["p_value"] = a.p_value;  // all digits: it is one of a grid's (p_distance)
   w.add("heldout_before", a.heldout_before);
   w.add("heldout_after", a.heldout_after);
   w.add("seconds", a.seconds);

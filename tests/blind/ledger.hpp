@@ -5,7 +5,7 @@
 ///
 ///     {"key":"clear/white/creep/1.0","program":"0.1.0","truth":{"kind":"single","noise":"white",…},"answer":{"verdict":"named",…}}
 ///
-/// What is empty, zero or false is left out; numbers have five digits. The gap stands for the signal that the answer speaks of, alone.
+/// What is empty, zero or false is left out; numbers have five digits, p-values all. The gap stands for the signal that the answer speaks of, alone.
 #pragma once
 
 #include <optional>

@@ -253,7 +253,7 @@ TEST(Ledger, is_scored_as_the_whole_answer_is) {
   cases[3].truth.kind = "none";
   cases[3].truth.ids = {};
   cases[3].answer.verdict = "none";
-  cases[3].answer.p_value = 0.25;
+  cases[3].answer.p_value = 1.0 / 4900;
   cases[4].answer.failed = "killed: too slow";
   std::vector<Case> kept;
   for (const Case& one : cases) {
@@ -261,6 +261,7 @@ TEST(Ledger, is_scored_as_the_whole_answer_is) {
     EXPECT_EQ(judge_case(kept.back()).closed, judge_case(one).closed);
   }
   EXPECT_EQ(report(kept), report(cases));
+  EXPECT_EQ(kept[3].answer.p_value, cases[3].answer.p_value);
   EXPECT_NE(report(kept).find("| creep | 4 | 3 |"), std::string::npos) << report(kept);
   Case untestable = single("leak");
   untestable.truth.testable = false;
