@@ -1,6 +1,6 @@
 /// @file
-/// The ledger: what is scored of a dataset and its answer, in one short line of JSON. A line of results holds the whole answer (10 kB), which is
-/// good for looking into and too much to keep; a line of the ledger holds a tenth, so that what several days measured with one program
+/// The ledger: what is scored of a dataset and its answer, in one short line of JSON. A line of results holds the whole answer (9 to 24 kB), which is
+/// good for looking into and too much to keep; a line of the ledger some 500 bytes, so that what several days measured with one program
 /// can be kept beside the sources and counted together.
 ///
 ///     {"key":"clear/white/creep/1.0","program":"0.1.0","truth":{"kind":"single","noise":"white",…},"answer":{"verdict":"named",…}}
