@@ -70,6 +70,35 @@ TEST(HeldOut, leaves_nothing_without_doubt_that_a_wandering_zero_alone_made) {
   }
 }
 
+std::vector<series::Recording> both_pressures_off(std::vector<series::Recording> runs, double pascal) {
+  for (series::Recording& run : runs)
+    for (series::Column& column : run.columns)
+      if (column.name == "p1" || column.name == "p2")
+        for (double& p : column.values) p += pascal;
+  return runs;
+}
+
+// Two sensors seldom err alike: where the valve's zero, which does that, is not looked for, theirs is told with doubt.
+TEST(Alike, errors_of_two_sensors_are_told_with_doubt) {
+  const test::TiedRig rig;
+  const auto answer = [&](std::vector<std::string> excluded) {
+    return explain(
+        both_pressures_off(test::record_all(rig, day_of(40), 10), 1000),
+        HeldOut(both_pressures_off(test::record_all(rig, kBeyond, 40), 1000)),
+        {.rig = rig.facts(), .excluded = std::move(excluded), .traces = false, .next_experiment = false});
+  };
+  const Explanation full = answer({}), without = answer({"pressure_gain_error"});
+  ASSERT_FALSE(full.effects.empty()) << full.summary;
+  EXPECT_EQ(full.effects.front().id, "pressure_gain_error");
+  EXPECT_TRUE(full.doubts.empty()) << full.summary;
+  ASSERT_FALSE(without.effects.empty()) << without.summary;
+  EXPECT_EQ(without.effects.front().id, "pressure_offset");
+  EXPECT_NE(without.verdict, Verdict::kNamed) << without.summary;
+  ASSERT_FALSE(without.doubts.empty()) << without.summary;
+  EXPECT_NE(without.doubts.front().find("both sensors err by the same"), std::string::npos)
+      << without.doubts.front();
+}
+
 TEST(Day, begins_with_its_first_run_held_out_or_not) {
   const test::TiedRig rig{.encoder_drift = 2e-6};
   const Explanation e = explained(rig, day_of(20), 10, rig, 0);  // twenty minutes later

@@ -215,5 +215,22 @@ TEST(Twins, both_sensors_zeros_stand_beside_a_valve_zero) {
   EXPECT_FALSE(ranked(1));
 }
 
+TEST(Twins, two_sensors_that_err_by_the_same_have_one_cause) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
+  const Ranking ranking(bench.data, bench.library);
+  const auto alike = [&](const char* id, Values values) {
+    Trial t;
+    t.hypothesis = static_cast<int>(bench.find(id) - bench.library.hypotheses.data());
+    t.values = values;
+    return ranking.err_alike(t);
+  };
+  EXPECT_TRUE(alike("pressure_offset", {500, 520}));
+  EXPECT_TRUE(alike("pressure_offset", {-500, -490}));
+  EXPECT_FALSE(alike("pressure_offset", {500, 300}));
+  EXPECT_FALSE(alike("pressure_offset", {500, -500}));
+  EXPECT_FALSE(alike("pressure_offset", {500, 0}));
+  EXPECT_FALSE(alike("coulomb_friction", {0.02, 0.02}));
+}
+
 }  // namespace
 }  // namespace isac::explain

@@ -8,6 +8,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/moments.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/unknown.hpp"
 
@@ -125,6 +126,29 @@ void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Pro
           s.signal, s.heldout, s.unit, s.heldout / s.rmse);
       return;
     }
+}
+
+void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
+  if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
+  const Moments moments = moments_of(data, found.model.residual);
+  if (!moments.stand_out()) return;
+  const Label label = label_of(data, moments.chain);
+  e.verdict = Verdict::kUnknown;
+  e.detected = true;
+  e.unknown = Unknown{};
+  e.unknown->subsystem = moments.chain == Chain::kTorque   ? "muscle"
+                         : moments.chain == Chain::kMotion ? "joint"
+                                                           : "pcu";
+  e.unknown->signal = label.signal;
+  e.unknown->unit = label.unit;
+  e.summary = fmt::format(
+      "In a few moments the {} is off as noise is nowhere else, most of all near {:.1f} s of run {}, where "
+      "the mean square is {:.0f} times the "
+      "usual one: something is missing that shows only there, and neither an effect of the catalogue nor a "
+      "function of the signals fits it. "
+      "Look at those moments.",
+      label.signal == "motion" ? "balance of the free joint's motion" : label.signal, moments.time,
+      data.runs[moments.run].name, moments.times_usual);
 }
 
 }  // namespace isac::explain

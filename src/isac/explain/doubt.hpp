@@ -7,7 +7,8 @@
 ///                 t ≥ 3 over the search's own baseline, where what only the recording's rate shows (raw_effects.hpp) then takes so much
 ///                 more that rms_after ≤ rms_before: two things are missing, and one of them was not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (remainder.cpp)
-///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too
+///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too, or a few moments that hold what noise holds
+///                 nowhere else (moments.hpp)
 ///
 /// t: compare.hpp's, of the user's baseline behind the named model. Units: the answer's. Threads: pure. Errors: none.
 /// Source: docs/derivations/explain.md.
@@ -32,5 +33,8 @@ void doubt(const Predictor& predictor, const Found& found, Explanation& e);
 
 /// A model that is right for the fitted runs and far off on the others lacks what only those excite.
 void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Proof& proof, Explanation& e);
+
+/// What shows in a few moments only, and fits no name and no function of the signals, is unknown and not nothing.
+void look_at_moments(const Prepared& data, const Found& found, Explanation& e);
 
 }  // namespace isac::explain

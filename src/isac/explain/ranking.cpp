@@ -14,6 +14,7 @@ namespace {
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 constexpr double kHardlyMore = 1.25;  // of the friction in motion: at rest it is nearly the same
+constexpr double kAlike = 0.1;        // of the larger: two sensors err by the same
 constexpr double kLimitReach =
     8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
@@ -49,6 +50,16 @@ bool Ranking::is_limit_case(const Trial& t) const {
       return true;
   }
   return false;
+}
+
+bool Ranking::err_alike(const Trial& t) const {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  if (h.info().where != models::Subsystem::kSensor || h.info().parameter_count != 2 || !h.amplitude[0] ||
+      !h.amplitude[1] || !h.free[0] || !h.free[1])
+    return false;
+  const double a = t.values[0] - h.info().parameters[0].null_value,
+               b = t.values[1] - h.info().parameters[1].null_value;
+  return std::abs(a - b) < kAlike * std::max(std::abs(a), std::abs(b));
 }
 
 /// Nothing forbids it, and of two that the data cannot tell apart the other is told first: what was added to a joint is seldom less than nothing.

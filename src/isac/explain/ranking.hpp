@@ -45,6 +45,8 @@ class Ranking {
   /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none, and a
   /// friction that is hardly larger at rest is dry friction.
   [[nodiscard]] bool is_limit_case(const Trial& trial) const;
+  /// Are there two sensors of one kind, and is what they err by the same?
+  [[nodiscard]] bool err_alike(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.

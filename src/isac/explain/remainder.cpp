@@ -15,6 +15,7 @@ constexpr double kGiant = 8;  // of what all effects close together, one by itse
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
+constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
 }  // namespace
 
@@ -87,6 +88,27 @@ void Search::look_at_remainder() {
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, left.size));
   say(found_.doubts.back());
+}
+
+void Search::look_at_limits() {
+  if (!found_.adequate || found_.added.empty()) return;
+  const std::size_t before = found_.doubts.size();
+  for (std::size_t i = 0; i < found_.added.size(); ++i) {
+    const Trial& named = found_.steps[i].trials.front();
+    const std::string id = ranking_.id_of(named);
+    if (ranking_.is_limit_case(named))
+      found_.doubts.push_back(
+          fmt::format("The shape of {} is at the end of its range, where it is hardly told from something "
+                      "simpler: it may be that.",
+                      id));
+    else if (ranking_.err_alike(named))
+      found_.doubts.push_back(
+          fmt::format("By {} both sensors err by the same: one cause of both is likelier than two.", id));
+  }
+  if (found_.added.size() >= kMany)
+    found_.doubts.push_back(fmt::format(
+        "It takes {} effects together: one that none of them is may look like that.", found_.added.size()));
+  for (std::size_t i = before; i < found_.doubts.size(); ++i) say(found_.doubts[i]);
 }
 
 }  // namespace isac::explain

@@ -139,6 +139,9 @@ class Search {
   void hold_against_itself();
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
   void look_at_remainder();
+  /// A name that stands only as what it turns into at the end of its range, two sensors that err by the same, and a crowd of effects may each
+  /// be one thing that the catalogue does not have.
+  void look_at_limits();
 
   const Predictor& predictor_;
   Library& library_;
