@@ -142,7 +142,7 @@ void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
   e.unknown->signal = label.signal;
   e.unknown->unit = label.unit;
   e.summary = fmt::format(
-      "In a few moments the {} is off as noise is nowhere else, most of all near {:.1f} s of run {}, where "
+      "In a few moments the {} is off as noise is nowhere else, most of all near {:.1f} s of {}, where "
       "the mean square is {:.0f} times the "
       "usual one: something is missing that shows only there, and neither an effect of the catalogue nor a "
       "function of the signals fits it. "
