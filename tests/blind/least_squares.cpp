@@ -74,7 +74,8 @@ LeastSquares::LeastSquares(const std::vector<Column>& fixed, const Column& y)
   add_products(normal_, fixed_, y, 0);
 }
 
-double LeastSquares::distance(const std::vector<const Column*>& extra, std::vector<double>* weights) const {
+double LeastSquares::distance(const std::vector<const Column*>& extra, std::vector<double>* weights,
+                              std::vector<double>* fixed) const {
   std::vector<const Column*> columns = fixed_;
   columns.insert(columns.end(), extra.begin(), extra.end());
   const std::size_t kept = fixed_.size();
@@ -98,6 +99,7 @@ double LeastSquares::distance(const std::vector<const Column*>& extra, std::vect
     for (std::size_t k = 0; k < count; ++k) sum += rest[k] * rest[k];
   }
   if (weights != nullptr) weights->assign(x.begin() + static_cast<std::ptrdiff_t>(kept), x.end());
+  if (fixed != nullptr) fixed->assign(x.begin(), x.begin() + static_cast<std::ptrdiff_t>(kept));
   return std::sqrt(sum);
 }
 

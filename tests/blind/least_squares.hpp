@@ -25,8 +25,9 @@ class LeastSquares {
   /// All of one length; both must outlive it.
   LeastSquares(const std::vector<Column>& fixed, const Column& y);
 
-  /// Norm of what the fixed columns and `extra` leave of y; `weights`, if given, gets those of `extra`.
-  double distance(const std::vector<const Column*>& extra, std::vector<double>* weights = nullptr) const;
+  /// Norm of what the fixed columns and `extra` leave of y; `weights`, if given, gets those of `extra`, `fixed` those of what stays.
+  double distance(const std::vector<const Column*>& extra, std::vector<double>* weights = nullptr,
+                  std::vector<double>* fixed = nullptr) const;
 
  private:
   std::vector<const Column*> fixed_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "colour.hpp"
 #include "known_runs.hpp"
@@ -15,6 +16,9 @@ namespace {
 constexpr double kStep = 1e-3;       // s, of the integrator: the rivals' responses need not be finer
 constexpr std::size_t kStride = 25;  // rows between two triangles of 20 Hz
 constexpr double kNear = 3.0;        // sigma
+constexpr double kWorthMoving =
+    0.5;  // of what is there without it: what is farther by sums of small responses is not simulated anew
+constexpr int kMoves = 6;
 
 class Oracle {
  public:
@@ -70,9 +74,10 @@ class Oracle {
       double nearest = 1e300;
       // Of two hidden effects one stays as it is and the other is swapped for the rival.
       if (d_.hidings.size() == 1)
-        nearest = nearest_of(rival, {}, random);
+        nearest = nearest_of(rival, kNoneKept, random);
       else
-        for (const auto& kept : true_columns_) nearest = std::min(nearest, nearest_of(rival, {kept}, random));
+        for (std::size_t kept = 0; kept < d_.hidings.size(); ++kept)
+          nearest = std::min(nearest, nearest_of(rival, kept, random));
       v.rivals[rival.id] = nearest;
       if (nearest < kNear) v.equals.push_back(rival.id);
     }
@@ -318,12 +323,14 @@ class Oracle {
     double sigma;
     Column column;
     Shape shape;
+    double amplitude;
   };
+  static constexpr std::size_t kNoneKept = static_cast<std::size_t>(-1);
 
   /// The rival with this shape, its amplitude sought: the response is linear in it only nearby.
   [[nodiscard]] Try with_shape(const Effect& rival, Shape shape, const std::vector<const Column*>& fixed,
                                double alone) {
-    Try best{alone, {}, shape};
+    Try best{alone, {}, shape, 0.0};
     double amplitude = rival.typical;
     for (int round = 0; round < 3; ++round) {
       Column column = response(rival, amplitude, shape);
@@ -332,7 +339,7 @@ class Oracle {
       std::vector<double> weights;
       const double sigma = fit_.distance(extra, &weights), weight = weights.back();
       const bool allowed = weight > 0.0 || shape.contains("sign");
-      if (allowed && sigma < best.sigma) best = {sigma, std::move(column), shape};
+      if (allowed && sigma < best.sigma) best = {sigma, std::move(column), shape, amplitude};
       if (!allowed || sigma > std::max(2.0 * kNear, 0.5 * alone) || std::abs(weight - 1.0) < 0.1) break;
       if (weight < 0.0) shape["sign"] = -shape["sign"];
       const double next = std::clamp(amplitude * std::abs(weight), rival.typical * 1e-3, rival.largest);
@@ -342,10 +349,80 @@ class Oracle {
     return best;
   }
 
-  double nearest_of(const Effect& rival, const std::vector<Column>& kept, Random& random) {
+  /// The hand leads a joint, or lets it go, where the encoder shows what the recording shows.
+  static void lead_to(const std::vector<double>& recorded, const std::vector<double>& shown, RunPlan& run) {
+    if (run.free) {
+      run.release_angle += recorded.front() - shown.front();
+      return;
+    }
+    std::vector<double> apart(recorded.size());
+    for (std::size_t k = 0; k < apart.size(); ++k) apart[k] = recorded[k] - shown[k];
+    const std::vector<double> velocity = velocity_of(apart);
+    for (std::size_t k = 0; k < apart.size(); ++k) {
+      run.hand[k] += apart[k];
+      run.hand_velocity[k] += velocity[k];
+    }
+  }
+
+  /// With the base parameters moved in the simulation as well. A free joint goes elsewhere with another inertia or stiffness, so that there
+  /// the responses of both are no sum: an added inertia and a gain of the encoder are the same equation, and were 5 to 20 sigma apart as sums.
+  [[nodiscard]] double moved(const Effect& rival, const Try& near, std::size_t kept) const {
+    Hidden kept_part;
+    kept_part.seed = d_.request.seed;
+    if (kept != kNoneKept) {
+      const Hiding& h = d_.hidings[kept];
+      h.effect->apply(kept_part, h.amplitude, h.shape);
+    }
+    Rig rig = d_.rig;
+    std::vector<RunPlan> plans;
+    for (const Still& still : still_) plans.push_back(d_.runs[still.run]);
+    double nearest = near.sigma, amplitude = near.amplitude;
+    for (int move = 0; move <= kMoves; ++move) {
+      Hidden hidden = kept_part;
+      rival.apply(hidden, amplitude, near.shape);
+      Column left = truth_;
+      std::size_t k = 0;
+      const auto take = [&](const Column& with, const Column& without) {
+        for (std::size_t i = 0; i < with.size(); ++i) left[k++] -= with[i] - without[i];
+      };
+      for (std::size_t r = 0; r < still_.size(); ++r) {
+        const Still& still = still_[r];
+        const RunPlan& run = plans[r];
+        const Signals s = simulate(rig, run, hidden, kStep);
+        take(pressure(true_base_, run.command_1, s.p1), still.p1);
+        take(pressure(true_base_, run.command_2, s.p2), still.p2);
+        take(torque(true_base_, run, s), still.torque);
+        lead_to(d_.clean[still.run].angle, s.angle, plans[r]);
+      }
+      double sum = 0.0;
+      for (const double value : left) sum += value * value;
+      const double sigma = std::sqrt(sum);
+      nearest = std::min(nearest, sigma);
+      std::vector<double> weights, base;
+      LeastSquares(base_, left).distance({&near.column}, &weights, &base);
+      rig.A += base[0] / (rig.r * rig.r);
+      rig.B += 2.0 * base[1] / rig.r;
+      rig.C -= base[2];
+      rig.D -= base[3];
+      rig.K_C += base[4];
+      rig.T_C *= std::exp(2.0 * base[5] / rig.K_C);
+      amplitude = std::clamp(amplitude + weights[0] * near.amplitude, rival.typical * 1e-3, rival.largest);
+    }
+    return nearest;
+  }
+
+  double nearest_of(const Effect& rival, std::size_t kept, Random& random) {
     std::vector<const Column*> fixed;
-    for (const Column& column : kept) fixed.push_back(&column);
+    if (kept != kNoneKept) fixed.push_back(&true_columns_[kept]);
     const double alone = fit_.distance(fixed);
+    const auto [by_sums, nearest] = nearest_by_sums(rival, fixed, alone, random);
+    if (by_sums < kNear || by_sums > kWorthMoving * alone) return by_sums;
+    return std::min(by_sums, moved(rival, nearest, kept));
+  }
+
+  /// Its sigma, and the try of one shape that is nearest.
+  std::pair<double, Try> nearest_by_sums(const Effect& rival, std::vector<const Column*> fixed, double alone,
+                                         Random& random) {
     std::vector<Try> tries;
     const auto take = [&](const Shape& shape) {
       if (Try one = with_shape(rival, shape, fixed, alone); !one.column.empty())
@@ -353,8 +430,8 @@ class Oracle {
       std::sort(tries.begin(), tries.end(), [](const Try& a, const Try& b) { return a.sigma < b.sigma; });
     };
     for (const Shape& shape : shapes_of(rival, random)) take(shape);
-    if (tries.empty()) return alone;
-    if (tries.size() == 1) return tries[0].sigma;
+    if (tries.empty()) return {alone, {}};
+    if (tries.size() == 1) return {tries[0].sigma, tries[0]};
     if (tries[0].sigma < 0.8 * alone && same_side(tries[0].shape, tries[1].shape)) {
       Shape middle = tries[0].shape;
       for (auto& [name, value] : middle)
@@ -362,15 +439,15 @@ class Oracle {
           value = 0.5 * (value + tries[1].shape.at(name));
       take(middle);
     }
-    if (!same_side(tries[0].shape, tries[1].shape)) return tries[0].sigma;
+    if (!same_side(tries[0].shape, tries[1].shape)) return {tries[0].sigma, tries[0]};
     // Two shapes together, neither against the other, stand for those between them.
     fixed.push_back(&tries[0].column);
     fixed.push_back(&tries[1].column);
     std::vector<double> weights;
     const double together = fit_.distance(fixed, &weights);
     const std::size_t last = weights.size() - 1;
-    if (weights[last] * weights[last - 1] < 0.0) return tries[0].sigma;
-    return std::min(tries[0].sigma, together);
+    if (weights[last] * weights[last - 1] < 0.0) return {tries[0].sigma, tries[0]};
+    return {std::min(tries[0].sigma, together), tries[0]};
   }
 
   /// A fitted run of the rig in which nothing is hidden, and its whitened channels.
