@@ -99,6 +99,11 @@ void Search::forward() {
       narrow_.reset();
     }
     if (found_.steps.empty()) found_.gate = step.gate;
+    if (getenv("DBG")) { fprintf(stderr,"limit T %g rare %g unit %g\n",step.screen.limit,step.screen.rare_limit,step.screen.noise_unit);
+      for (std::size_t i=0;i<std::min<std::size_t>(14,step.screen.candidates.size());++i){const auto&c=step.screen.candidates[i]; const auto&h=library_.hypotheses[(std::size_t)c.hypothesis];
+       fprintf(stderr,"  %s T %.2f gain %.1f rare_p %.3g shape",h.id().c_str(),c.T,c.gain,c.rare_p); for(int k=0;k<h.info().parameter_count;++k) fprintf(stderr," %g",c.start[(std::size_t)k]); fprintf(stderr,"\n");}
+      std::vector<const Column*> cs; for(const auto&c:step.screen.columns) if(c.norm2>0) cs.push_back(&c); std::sort(cs.begin(),cs.end(),[](auto a,auto b){return a->T>b->T;});
+      for(std::size_t i=0;i<std::min<std::size_t>(8,cs.size());++i) fprintf(stderr,"  col %s hyp %d T %.2f score %.1f n %.1f z %.2f\n",cs[i]->name.c_str(),cs[i]->hypothesis,cs[i]->T,cs[i]->score,cs[i]->norm2, cs[i]->score/std::sqrt(cs[i]->norm2*step.screen.noise_unit)); }
     const bool open = is_open(step);
     say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                            "of {:.1f} s)",

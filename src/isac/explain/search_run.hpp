@@ -97,6 +97,9 @@ class Search {
   /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
   /// candidate leaves over. So is the yardstick of one that few blocks carry.
   Screen screen_here();
+  /// What the candidate leaves (r/σ) beside which the noise is likeliest, among those that are large for sure: what is slow and missing passes
+  /// for slow noise until it is taken out.
+  Eigen::VectorXd least_noise_beside(const Screen& s) const;
   Gate gate_of(const Screen& s, const std::set<std::string>& ignored = {}) const {
     return gate_.judge(s, found_.weights, found_.floors, !found_.added.empty(), ignored);
   }

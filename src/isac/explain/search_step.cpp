@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -13,6 +14,7 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kShortlist = 9;
+constexpr std::size_t kColours = 6;       // effects beside which the noise's colour is read off
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
@@ -66,6 +68,28 @@ Weights Search::noise_of_what_is_left() const {
   return left;
 }
 
+Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
+  std::vector<Screened> large;
+  std::set<std::string> seen;
+  for (const Screened& c : s.candidates)
+    if (c.gain > kLargeForSure * s.noise_unit && large.size() < kColours &&
+        seen.insert(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()).second)
+      large.push_back(c);
+  Eigen::VectorXd best;
+  double most = -std::numeric_limits<double>::infinity();
+  for (const Trial& t : refit_all(large)) {
+    const Eigen::VectorXd rows = unfiltered(data_, found_.weights, t.residual);
+    Weights weights = found_.weights;
+    take_colours(data_, beside_generic_functions(data_, rows), weights);
+    const double here = log_likelihood(data_, weights, rows);
+    if (getenv("DBG")) { fprintf(stderr,"colour beside %s %g %g: loglik %.1f  torque w %g s %g tau %g wander %g\n",ranking_.id_of(t).c_str(),t.values[0],t.values[1],here,weights.colour[0].white,weights.colour[0].slow,weights.colour[0].memory,weights.colour[0].wander); }
+    if (here <= most) continue;
+    most = here;
+    best = rows;
+  }
+  return best;
+}
+
 Screen Search::screen_here() {
   choose_blocks(place_.residual);
   Screen s = screen(place_, library_, screen_options(), &responses_, narrow_ ? &*narrow_ : nullptr);
@@ -79,7 +103,7 @@ Screen Search::screen_here() {
   if (large_and_not_found && found_.added.empty() && !colour_beside_best_) {
     // Too little is left of it in the other blocks, or the noise was taken for as slow as the effect is.
     colour_beside_best_ = true;
-    take_colour(unfiltered(data_, found_.weights, best.front().residual));
+    take_colour(least_noise_beside(s));
     return found_.wants_torque_of_free_runs ? s : screen_here();
   }
   if (large_and_not_found) {

@@ -331,4 +331,19 @@ void take_colours(const Prepared& data, const Eigen::VectorXd& residual, Weights
   weights.take(data);
 }
 
+double log_likelihood(const Prepared& data, const Weights& weights, const Eigen::VectorXd& residual) {
+  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
+  Eigen::VectorXd rows = residual;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    rows[static_cast<Eigen::Index>(i)] *= weights.sigma[static_cast<int>(data.rows[i].chain)];
+  weigh(data, weights, rows);
+  double sum = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const double white = weights.colour[static_cast<int>(data.rows[i].chain)].white,
+                 e = rows[static_cast<Eigen::Index>(i)];
+    sum += e * e / white + std::log(white) - (filter ? 2 * std::log(filter->gains[i].scale) : 0.0);
+  }
+  return -0.5 * sum;
+}
+
 }  // namespace isac::explain

@@ -60,4 +60,8 @@ void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::Vecto
 /// Colours of all chains from a residual r/σ, and whether torque and motion have one zero: `weights` with them, ready (take() is called).
 void take_colours(const Prepared& data, const Eigen::VectorXd& residual, Weights& weights);
 
+/// Logarithm of the likelihood of a residual r/σ under these colours, but for a constant: −½ Σ (v²/(P + w) + ln(P + w)).
+[[nodiscard]] double log_likelihood(const Prepared& data, const Weights& weights,
+                                    const Eigen::VectorXd& residual);
+
 }  // namespace isac::explain
