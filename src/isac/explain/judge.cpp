@@ -162,6 +162,27 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   return test;
 }
 
+double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after) {
+  const auto blocks = static_cast<Eigen::Index>(data.blocks);
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(blocks), norm2 = Eigen::VectorXd::Zero(blocks);
+  std::vector<Eigen::Index> run_of_block(data.blocks, 0);
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i), block = static_cast<Eigen::Index>(data.rows[i].block);
+    const double closed = before[row] - after[row];
+    norm2[block] += closed * closed;
+    left[block] += after[row] * closed;
+    run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
+  }
+  if (!(norm2.sum() > 0)) return 1;
+  const double score = norm2.sum() + left.sum();
+  const Jackknife of = jackknife(left, norm2);
+  if (!(of.carried_by > 2) || !(of.scatter > 0)) return 1;
+  const double p = series::student_t_two_sided(std::abs(score) / of.scatter, of.carried_by - 1);
+  return std::max(
+      p,
+      p_by_runs(score, left, norm2, run_of_block, static_cast<Eigen::Index>(data.runs.size())).value_or(0));
+}
+
 double joint_p(double flips, double rare, double level) noexcept {
   const auto least = [&](double p, double beyond) {
     const double spent = kShareOfEach * level;
@@ -247,6 +268,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
       c.rare_p = jackknife_p(score, own, c.run_error.squaredNorm());
     }
     c.rare_p = std::max(c.rare_p, told_by_runs(c).value_or(0));
+    if (c.hypothesis == yardstick.hypothesis) c.rare_p = std::min(c.rare_p, yardstick.own_p);
     ++rare_columns;
   }
   result.rare_p = 1;

@@ -9,8 +9,11 @@ namespace isac::explain {
 namespace {
 
 constexpr double kAlpha = 0.001;
-constexpr double kFarOut = 8;   // standard deviations of the white noise
-constexpr double kAlike = 0.5;  // of the height: how far the neighbours may be apart
+constexpr double kFarOut =
+    8;  // standard deviations of the white noise: alone so far out is no part of its tail
+constexpr double kLeastOut = 6.5;  // of them: none of 10⁶ differences of normal noise is so large
+constexpr double kMostBent = 1.6;  // exponent of a tail, 2 for normal noise far out
+constexpr double kAlike = 0.5;     // of the height: how far the neighbours may be apart
 
 /// d of every sample that has both neighbours; NaN elsewhere.
 template <class Take>
@@ -69,9 +72,12 @@ Outliers find_outliers(std::span<const Series> runs, double quantum) {
   }
   if (size.size() < 1000) return {};
   const double q90 = series::quantile(size, 0.90), q98 = series::quantile(size, 0.98);
-  const double b = std::max((q98 - q90) / std::log(5.0), q98 / std::log(50.0));
-  const double tail = q98 + b * std::log(0.02 * static_cast<double>(size.size()) / kAlpha);
-  return count_outliers(runs, std::max({tail, kFarOut * white, 3 * quantum}));
+  // ln(1/S) = (x/a)^k through S = 0.1 and 0.02, to the x that one of all passes with the probability α.
+  const double k =
+      std::clamp(std::log(std::log(50.0) / std::log(10.0)) / std::log(q98 / q90), 0.5, kMostBent);
+  const double tail =
+      q98 * std::pow(std::log(static_cast<double>(size.size()) / kAlpha) / std::log(50.0), 1 / k);
+  return count_outliers(runs, std::max({tail, kLeastOut * white, 3 * quantum}));
 }
 
 }  // namespace isac::explain

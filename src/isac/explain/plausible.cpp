@@ -9,7 +9,7 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kSameWithin = 0.2;   // of the larger: no asymmetry
+constexpr double kSameWithin = 0.1;   // of the larger: no asymmetry
 constexpr double kMoreAtRest = 1.05;  // of the friction in motion
 constexpr double kWidest = 0.25;      // of the angles reached: a loop that motions still go round
 constexpr double kOnNothing = 0.1;    // exponent of the mean pressure: no dependence

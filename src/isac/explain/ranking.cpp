@@ -67,6 +67,11 @@ bool Ranking::is_against_its_name(const Trial& t) const {
   return id_of(t) == "inertia_error" && t.values[0] < 0;
 }
 
+/// An inertia is estimated, the steps of a turn are counted: of the two, which are one equation, a joint that is heavier than was said is told first.
+bool Ranking::is_likelier_cause(const Trial& t, const Trial& than) const {
+  return id_of(t) == "inertia_error" && t.values[0] > 0 && id_of(than) == "encoder_gain";
+}
+
 /// Both sensors' zeros off by the same are what a valve zero is, and as likely: no general case that happens to fit.
 bool Ranking::are_two_causes_of_one(const Trial& general, const Trial& simple) const {
   return id_of(general) == "pressure_offset" && id_of(simple) == "pressure_gain_error" &&
@@ -98,7 +103,8 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
       const int more = parameters_of(trials[i]) - parameters_of(trials[0]);
       const bool likelier =
           twins &&
-          (more < 0 || (more == 0 && is_against_its_name(trials[0]) && !is_against_its_name(trials[i])));
+          (more < 0 || (more == 0 && ((is_against_its_name(trials[0]) && !is_against_its_name(trials[i])) ||
+                                      is_likelier_cause(trials[i], trials[0]))));
       if (!simpler && !likelier) continue;
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);

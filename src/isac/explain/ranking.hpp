@@ -48,6 +48,7 @@ class Ranking {
   /// Are there two sensors of one kind, and is what they err by the same?
   [[nodiscard]] bool err_alike(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
+  [[nodiscard]] bool is_likelier_cause(const Trial& trial, const Trial& than) const;
   [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.

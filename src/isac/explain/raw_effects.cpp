@@ -20,7 +20,9 @@ namespace {
 constexpr double kMainsLow = 45, kMainsHigh = 65;  // Hz, as the catalogue has it
 constexpr std::size_t kFewestSpikes = 5;
 constexpr double kBesideNamed = 0.35;  // of the gap that the named effects closed
-constexpr double kLooks = 3;           // lines of torque, of motion, and spikes share the significance
+constexpr double kBesideUnknown =
+    2;                        // sizes of what is left unnamed: a line that is larger is what is missing
+constexpr double kLooks = 3;  // lines of torque, of motion, and spikes share the significance
 
 /// Mean square that something takes out of a residual; negative where it adds.
 using Taken = std::function<double(const std::vector<Series>&)>;
@@ -245,10 +247,19 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
   const bool unnamed = e.verdict == Verdict::kUnknown, in_valves = e.unknown && e.unknown->subsystem == "pcu";
   if (e.effects.empty() && (!unnamed || in_valves) && valve_hunts(predictor, model, found, options, e))
     return;
-  if (unnamed) return;
+  if (unnamed && (in_valves || found.steps.empty())) return;
   std::vector<RawEffect> effects = look(predictor, model, options);
   std::stable_sort(effects.begin(), effects.end(),
                    [](const RawEffect& a, const RawEffect& b) { return a.rms > b.rms; });
+  // What functions of the signals make of a line is small beside the line.
+  if (unnamed) {
+    if (effects.empty() ||
+        effects.front().rms < kBesideUnknown * found.steps.front().gate.size *
+                                  found.floors.white[static_cast<int>(effects.front().chain)])
+      return;
+    e.verdict = Verdict::kNone;
+    e.unknown.reset();
+  }
   for (RawEffect& effect : effects) {
     const std::string id = effect.candidate.id;
     const auto is = [&](const Candidate& c) { return c.id == id; };

@@ -356,8 +356,8 @@ Eigen::MatrixXf& Responses::effect(int hypothesis) {
 }
 
 Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses& kept, int hypothesis,
-                           const Eigen::VectorXd& residual) {
-  Yardstick yardstick{.hypothesis = hypothesis, .functions = {}};
+                           const Eigen::VectorXd& before, const Eigen::VectorXd& residual) {
+  Yardstick yardstick{.hypothesis = hypothesis, .functions = {}, .own_p = p_of_refit(data, before, residual)};
   std::size_t function = 0;
   for (const Column& known : screen.columns) {
     if (known.hypothesis >= 0) continue;

@@ -12,8 +12,9 @@
 namespace isac::explain {
 namespace {
 
-constexpr std::size_t kContenders = 16;  // of each screen
-constexpr double kConvention = 0.12;     // relative
+constexpr std::size_t kContenders = 16;     // of each screen
+constexpr double kConvention = 0.12;        // relative, of the encoder's half step
+constexpr double kConventionOfTime = 0.06;  // of a sample, or half of one: a dead time is fitted within 3 %
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
 constexpr double kHardlyAnything =
@@ -99,11 +100,6 @@ void Search::forward() {
       narrow_.reset();
     }
     if (found_.steps.empty()) found_.gate = step.gate;
-    if (getenv("DBG")) { fprintf(stderr,"limit T %g rare %g unit %g\n",step.screen.limit,step.screen.rare_limit,step.screen.noise_unit);
-      for (std::size_t i=0;i<std::min<std::size_t>(14,step.screen.candidates.size());++i){const auto&c=step.screen.candidates[i]; const auto&h=library_.hypotheses[(std::size_t)c.hypothesis];
-       fprintf(stderr,"  %s T %.2f gain %.1f rare_p %.3g shape",h.id().c_str(),c.T,c.gain,c.rare_p); for(int k=0;k<h.info().parameter_count;++k) fprintf(stderr," %g",c.start[(std::size_t)k]); fprintf(stderr,"\n");}
-      std::vector<const Column*> cs; for(const auto&c:step.screen.columns) if(c.norm2>0) cs.push_back(&c); std::sort(cs.begin(),cs.end(),[](auto a,auto b){return a->T>b->T;});
-      for(std::size_t i=0;i<std::min<std::size_t>(8,cs.size());++i) fprintf(stderr,"  col %s hyp %d T %.2f score %.1f n %.1f z %.2f\n",cs[i]->name.c_str(),cs[i]->hypothesis,cs[i]->T,cs[i]->score,cs[i]->norm2, cs[i]->score/std::sqrt(cs[i]->norm2*step.screen.noise_unit)); }
     const bool open = is_open(step);
     say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                            "of {:.1f} s)",
@@ -183,8 +179,8 @@ bool Search::is_worth_a_second_name(const Step& step) const {
 }
 
 bool Search::is_convention(const Step& step) {
-  const auto near = [](double share, double convention) {
-    return std::abs(share - convention) < kConvention * convention;
+  const auto near = [](double share, double convention, double within) {
+    return std::abs(share - convention) < within * convention;
   };
   for (const Trial& t : step.trials) {
     if (!t.in_set) continue;
@@ -194,9 +190,10 @@ bool Search::is_convention(const Step& step) {
     if (std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
                     [&](const Hypothesis& h) { return h.id() == id && h.upper[0] > 0; }))
       continue;
-    if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5)) {
+    if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5, kConvention)) {
       tolerate(library_, data_, id, -0.5 * step_angle, 0.5 * step_angle);
-    } else if (id == "dead_time" && (near(t.values[0] / interval, 0.5) || near(t.values[0] / interval, 1))) {
+    } else if (id == "dead_time" && (near(t.values[0] / interval, 0.5, kConventionOfTime) ||
+                                     near(t.values[0] / interval, 1, kConventionOfTime))) {
       tolerate(library_, data_, id, -interval, interval);
     } else {
       continue;

@@ -82,7 +82,6 @@ Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
     Weights weights = found_.weights;
     take_colours(data_, beside_generic_functions(data_, rows), weights);
     const double here = log_likelihood(data_, weights, rows);
-    if (getenv("DBG")) { fprintf(stderr,"colour beside %s %g %g: loglik %.1f  torque w %g s %g tau %g wander %g\n",ranking_.id_of(t).c_str(),t.values[0],t.values[1],here,weights.colour[0].white,weights.colour[0].slow,weights.colour[0].memory,weights.colour[0].wander); }
     if (here <= most) continue;
     most = here;
     best = rows;
@@ -108,7 +107,7 @@ Screen Search::screen_here() {
   }
   if (large_and_not_found) {
     judge(s, data_, library_, screen_options(),
-          yardstick_beside(s, data_, responses_, first.hypothesis, best.front().residual));
+          yardstick_beside(s, data_, responses_, first.hypothesis, place_.residual, best.front().residual));
   } else if (data_.block_seconds < before) {
     judge(s, data_, library_, screen_options());
   }
