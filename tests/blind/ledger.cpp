@@ -51,6 +51,7 @@ json write_truth(const Truth& t, const std::set<std::string>& gap_signals) {
   w.add("subsystems", t.subsystems);
   w.add("depends_on", t.depends_on);
   w.add("nearest_equal", t.nearest_equal);
+  w.add("equals", t.equals);
   w.add("gap", t.gap, gap_signals);
   w.add("gap_noise", t.gap_noise, gap_signals);
   w.add("gap_closes", t.gap_closes, gap_signals);
@@ -91,6 +92,7 @@ Truth read_truth(const json& j) {
   t.subsystems = j.value("subsystems", Words{});
   t.depends_on = j.value("depends_on", Words{});
   t.nearest_equal = j.value("nearest_equal", "");
+  t.equals = j.value("equals", t.nearest_equal.empty() ? Words{} : Words{t.nearest_equal});
   t.gap = j.value("gap", Numbers{});
   t.gap_noise = j.value("gap_noise", Numbers{});
   t.gap_closes = j.value("gap_closes", Numbers{});

@@ -33,8 +33,11 @@ void count(const Case& one, Row& row) {
     row.first += j.first ? 1 : 0;
     row.in_set += j.in_set ? 1 : 0;
     row.names += static_cast<double>(a.effects.size() + a.alternatives.size());
-    row.wrong +=
-        asserts && a.effects.front() != truth && a.effects.front() != one.truth.nearest_equal ? 1 : 0;
+    row.wrong += asserts && a.effects.front() != truth &&
+                         std::find(one.truth.equals.begin(), one.truth.equals.end(), a.effects.front()) ==
+                             one.truth.equals.end()
+                     ? 1
+                     : 0;
     if (j.closed > -1) row.closed.push_back(j.closed);
   } else if (kind == "unknown") {
     row.unknown += 1;

@@ -142,16 +142,17 @@ bool flagged(const Scored& s) {
 
 /// Every dataset is in one of the columns, and the last line says whose names were taken.
 std::string left_out(const Group& group) {
-  std::string text = by_noise("The effect's own name taken out of the catalogue", group,
-                              {{"unknown", [](const Scored& s) { return s.j.left_unnamed; }},
-                               {"a set that says it is not sure", flagged},
-                               {"another's name, not flagged", [](const Scored& s) { return s.j.asserted; }},
-                               {"nothing found, or no answer", [](const Scored& s) {
-                                  return !s.j.left_unnamed && !s.j.asserted && !flagged(s);
-                                }}});
+  std::string text =
+      by_noise("The effect's own name taken out of the catalogue", group,
+               {{"unknown", [](const Scored& s) { return s.j.left_unnamed; }},
+                {"a set that says it is not sure", flagged},
+                {"another's name, not flagged", [](const Scored& s) { return s.j.asserted && !s.j.tied; }},
+                {"the name of a twin (below 3 sigma)", [](const Scored& s) { return s.j.tied; }},
+                {"nothing found, or no answer",
+                 [](const Scored& s) { return !s.j.left_unnamed && !s.j.asserted && !flagged(s); }}});
   std::map<std::string, int> taken;
   for (const Scored& s : group)
-    if (s.j.asserted) ++taken[s.one->truth.ids.front() + " as " + s.one->answer.effects.front()];
+    if (s.j.asserted && !s.j.tied) ++taken[s.one->truth.ids.front() + " as " + s.one->answer.effects.front()];
   if (taken.empty()) return text;
   text += "Another's name, not flagged:";
   const char* before = " ";

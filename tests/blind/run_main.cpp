@@ -35,7 +35,7 @@ constexpr const char* kUsage =
     "  default all but the last); KINDS as in blind_generate\n"
     "  leave-one-out: the datasets of clear again, judged with '--exclude ID' of what is hidden\n"
     "  --count: datasets per kind of noise, where one effect is hidden also per effect (default 1)\n"
-    "  --oracle: where names can be right (strong, clear, faint, pair) the label says what nobody can tell "
+    "  --oracle: where one of the catalogue is hidden the label says what nobody can tell "
     "apart\n"
     "  --twin: the program is also asked about the same day with nothing hidden: the floor of the gap that "
     "it closes\n"
@@ -286,9 +286,9 @@ std::string line_of(const Plan& plan, const Task& task) {
     const std::vector<blind::Signals> noisy = blind::write_dataset(dataset, scratch.path / "dataset");
     noise = blind::heldout_noise(dataset, noisy);
     closes = blind::heldout_closes(dataset, noisy);
-    // Only a name can be tied with another: where none is right, nobody asks the oracle.
+    // Only a name can be tied with another: where none can be, nobody asks the oracle.
     const bool names = !dataset.hidings.empty() && dataset.hidings.front().effect->catalogued;
-    if (plan.oracle && names && !task.left_out) verdict = blind::judge(dataset);
+    if (plan.oracle && names) verdict = blind::judge(dataset);
     std::vector<std::string> words = {plan.program.string(), (scratch.path / "dataset").string(), "--json",
                                       "-"};
     std::string ids;

@@ -46,6 +46,7 @@ Truth read_truth(const json& label) {
   if (const json& oracle = label.at("oracle"); oracle.is_object()) {
     double nearest = 3.0;
     for (const auto& [id, sigma] : oracle.at("rivals").items()) {
+      if (sigma.is_number() && sigma.get<double>() < 3.0) t.equals.push_back(id);
       if (!sigma.is_number() || sigma.get<double>() >= nearest) continue;
       nearest = sigma.get<double>();
       t.nearest_equal = id;
@@ -183,7 +184,7 @@ Judgement judge_case(const Case& one) {
   j.left_unnamed = a.verdict == "unknown" && a.effects.empty();
   const bool one_name = a.verdict == "named" && a.effects.size() == 1 && a.alternatives.empty();
   j.asserted = a.verdict == "named" && !a.effects.empty() && a.alternatives.empty();
-  j.single_wrong = one_name && !holds(t.ids, a.effects.front()) && a.effects.front() != t.nearest_equal;
+  j.single_wrong = one_name && !holds(t.ids, a.effects.front()) && !holds(t.equals, a.effects.front());
   if (t.kind == "single") {
     const std::string& truth = t.ids.front();
     const bool tie = !t.nearest_equal.empty();
@@ -205,7 +206,9 @@ Judgement judge_case(const Case& one) {
   }
   const std::string subsystem = a.subsystems.empty() ? a.where : a.subsystems.front();
   if (t.kind == "single" || t.kind == "unknown")
-    j.right_side = !subsystem.empty() && (subsystem == "sensor") == (t.side == "sensor");
+    j.right_side = (j.in_set && !t.nearest_equal.empty()) ||
+                   (!subsystem.empty() && (subsystem == "sensor") == (t.side == "sensor"));
+  if (t.kind == "left_out") j.tied = j.asserted && holds(t.equals, a.effects.front());
   return j;
 }
 

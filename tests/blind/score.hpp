@@ -17,7 +17,8 @@ struct Truth {
   double ratio = 0;                            ///< asked for
   bool testable = true;
   std::vector<std::string> ids, subsystems, depends_on;
-  std::string nearest_equal;  ///< the nearest rival below three sigma, or empty
+  std::string nearest_equal;        ///< the nearest rival below three sigma, or empty
+  std::vector<std::string> equals;  ///< all of them
   /// Per signal (torque, driven, pressure, p1, p2, balance): gap that the true model closes on held-out runs, the noise left, and the mean
   /// square that it takes out of these very recordings.
   std::map<std::string, double> gap, gap_noise, gap_closes;
@@ -56,7 +57,10 @@ struct Judgement {
   bool all_named = false;     ///< of two hidden effects both
   bool one_named = false;     ///< of two hidden effects just one
   bool asserted = false;      ///< named, and nothing beside it says that it might be another
-  bool left_unnamed = false, right_variables = false, right_side = false;
+  bool tied =
+      false;  ///< asserted under the name of a rival below three sigma of what was left out: nobody can know
+  bool left_unnamed = false, right_variables = false;
+  bool right_side = false;  ///< sensor or process; of a tie a set that holds both
   int set_size = 0;
   /// Share of the gap closed on held-out runs; −1: not known. `closed`: of what lies above the same day with nothing hidden (without that twin, as
   /// `closed_truth`); `closed_truth`: of what the generator's own true model closes there.

@@ -57,6 +57,7 @@ TEST(Score, counts_a_single_wrong_name_but_not_one_with_alternatives) {
 TEST(Score, gives_nothing_for_a_single_name_where_the_oracle_says_that_two_cannot_be_told_apart) {
   Case one = single("inertia_error");
   one.truth.nearest_equal = "encoder_gain";
+  one.truth.equals = {"encoder_gain"};
   one.answer = named({"inertia_error"});
   Judgement j = judge_case(one);
   EXPECT_FALSE(j.first || j.first_three || j.in_set);
@@ -170,9 +171,11 @@ TEST(Score, tells_how_a_dataset_ended_whose_effect_has_no_name_any_more) {
   cases[1].answer = named({"hysteresis"}, {"leak"});
   cases[2].answer = named({"hysteresis", "leak"});  // two names are no less sure than one
   cases[3].answer.verdict = "none";
+  cases.push_back(cases[2]);
+  cases[4].truth.equals = {"hysteresis"};  // nobody can tell the two apart
   const std::string text = report(cases);
-  const std::string quarter = " 1/4 = 25.0 % (4.6 to 69.9) |";
-  EXPECT_NE(text.find("| white |" + quarter + quarter + quarter + quarter), std::string::npos) << text;
+  const std::string fifth = " 1/5 = 20.0 % (3.6 to 62.4) |";
+  EXPECT_NE(text.find("| white |" + fifth + fifth + fifth + fifth + fifth), std::string::npos) << text;
   EXPECT_NE(text.find("creep as hysteresis (1)"), std::string::npos) << text;
   EXPECT_EQ(text.find("Confusion matrix: hidden, and named first\n\n| hidden | datasets | right | also named "
                       "(datasets) |\n|---|---|---|---|\n| creep"),
@@ -249,6 +252,7 @@ TEST(Ledger, is_scored_as_the_whole_answer_is) {
   cases[1].floor = {{"torque", 0.02}};
   cases[1].baselines["B1"] = named({"hysteresis"}, {"creep"});
   cases[2].truth.nearest_equal = "hysteresis";
+  cases[2].truth.equals = {"hysteresis"};
   cases[2].answer = named({"creep"}, {"hysteresis"});
   cases[3].truth.kind = "none";
   cases[3].truth.ids = {};

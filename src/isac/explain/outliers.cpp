@@ -11,9 +11,10 @@ namespace {
 constexpr double kAlpha = 0.001;
 constexpr double kFarOut =
     8;  // standard deviations of the white noise: alone so far out is no part of its tail
-constexpr double kLeastOut = 6.5;  // of them: none of 10⁶ differences of normal noise is so large
-constexpr double kMostBent = 1.6;  // exponent of a tail, 2 for normal noise far out
-constexpr double kAlike = 0.5;     // of the height: how far the neighbours may be apart
+constexpr double kLeastOut = 6.5;   // of them: none of 10⁶ differences of normal noise is so large
+constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors, and a tail may become fatter
+constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
+constexpr double kAlike = 0.5;      // of the height: how far the neighbours may be apart
 
 /// d of every sample that has both neighbours; NaN elsewhere.
 template <class Take>
@@ -75,8 +76,8 @@ Outliers find_outliers(std::span<const Series> runs, double quantum) {
   // ln(1/S) = (x/a)^k through S = 0.1 and 0.02, to the x that one of all passes with the probability α.
   const double k =
       std::clamp(std::log(std::log(50.0) / std::log(10.0)) / std::log(q98 / q90), 0.5, kMostBent);
-  const double tail =
-      q98 * std::pow(std::log(static_cast<double>(size.size()) / kAlpha) / std::log(50.0), 1 / k);
+  const double tail = q98 * std::pow(std::log(static_cast<double>(size.size()) / kAlpha) / std::log(50.0),
+                                     1 / (kLessBent * k));
   return count_outliers(runs, std::max({tail, kLeastOut * white, 3 * quantum}));
 }
 

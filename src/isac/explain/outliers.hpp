@@ -2,7 +2,7 @@
 /// Single samples that stand out of what a model leaves over: spikes of a reading.
 ///
 ///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other
-///   limit = max(q98 (ln(N/α)/ln 50)^(1/k), 6.5 s, 3 quanta),  k = ln(ln 50/ln 10)/ln(q98/q90), 0.5 ≤ k ≤ 1.6
+///   limit = max(q98 (ln(N/α)/ln 50)^(1/(0.96 k)), 6.5 s, 3 quanta),  k = ln(ln 50/ln 10)/ln(q98/q90), 0.5 ≤ k ≤ 1.6
 ///
 /// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: the tail ln(1/S) = (x/a)^k that passes through both is continued
 /// to where one of N samples passes with probability α (k is 1 for Laplace's noise, 1.5 here for normal noise, whose own tail is thinner
