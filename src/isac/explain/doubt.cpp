@@ -7,10 +7,12 @@
 #include <utility>
 
 #include "isac/core/units.hpp"
+#include "isac/explain/curves.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/moments.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/unknown.hpp"
+#include "isac/explain/variable_words.hpp"
 
 namespace isac::explain {
 namespace {
@@ -149,6 +151,30 @@ void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
       "Look at those moments.",
       label.signal == "motion" ? "balance of the free joint's motion" : label.signal, moments.time,
       data.runs[moments.run].name, moments.times_usual);
+}
+
+void look_at_curves(const Prepared& data, const Found& found, const ExplainOptions& options, Explanation& e) {
+  if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
+  const Curve curve =
+      clearest_curve(data, found.weights, found.floors, found.model.residual, options.material, options.seed);
+  if (!stands_out(curve)) return;
+  const Label label = label_of(data, curve.chain);
+  e.verdict = Verdict::kUnknown;
+  e.detected = true;
+  e.unknown = Unknown{};
+  e.unknown->subsystem = curve.chain == Chain::kTorque   ? "muscle"
+                         : curve.chain == Chain::kMotion ? "joint"
+                                                         : "pcu";
+  e.unknown->signal = label.signal;
+  e.unknown->unit = label.unit;
+  e.unknown->depends_on = {curve.variable};
+  e.summary = fmt::format(
+      "The {} depends on {} by a curve that neither an effect of the catalogue nor a function of the signals "
+      "is "
+      "like: {:.2f} of the noise floor, and as regular as noise is not by {:.0f} standard deviations.",
+      label.signal == "motion" ? "balance of the free joint's motion" : label.signal,
+      variable_in_words(curve.variable, of_linear_axis(axis_unit("rad", data.baseline))), curve.size,
+      curve.z);
 }
 
 }  // namespace isac::explain

@@ -37,4 +37,7 @@ void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Pro
 /// What shows in a few moments only, and fits no name and no function of the signals, is unknown and not nothing.
 void look_at_moments(const Prepared& data, const Found& found, Explanation& e);
 
+/// What depends on one signal by a curve that no name and no function is like is unknown, and not nothing.
+void look_at_curves(const Prepared& data, const Found& found, const ExplainOptions& options, Explanation& e);
+
 }  // namespace isac::explain

@@ -235,6 +235,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
   look_at_moments(data, found, e);
+  look_at_curves(data, found, options, e);
   return e;
 }
 
