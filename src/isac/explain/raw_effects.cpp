@@ -6,6 +6,8 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
+#include <utility>
 
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
@@ -252,13 +254,14 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
   std::stable_sort(effects.begin(), effects.end(),
                    [](const RawEffect& a, const RawEffect& b) { return a.rms > b.rms; });
   // What functions of the signals make of a line is small beside the line.
+  std::optional<Unknown> beside;
   if (unnamed) {
     if (effects.empty() ||
         effects.front().rms < kBesideUnknown * found.steps.front().gate.size *
                                   found.floors.white[static_cast<int>(effects.front().chain)])
       return;
     e.verdict = Verdict::kNone;
-    e.unknown.reset();
+    beside = std::exchange(e.unknown, std::nullopt);
   }
   for (RawEffect& effect : effects) {
     const std::string id = effect.candidate.id;
@@ -317,6 +320,10 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
     e.p_value = std::min(e.p_value, effect.p_value);
     e.detected = true;
     if (e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial) e.verdict = Verdict::kNamed;
+  }
+  if (unnamed && e.verdict == Verdict::kNone) {  // the line was none after all
+    e.verdict = Verdict::kUnknown;
+    e.unknown = std::move(beside);
   }
 }
 
