@@ -111,6 +111,10 @@ void Search::forward() {
     report(step.trials);
     found_.adequate = !open;
     if (open && found_.added.empty() && is_convention(step)) continue;
+    if (open && found_.added.empty() && a_wandering_zero_was_hidden_by(step)) {
+      if (found_.wants_torque_of_free_runs) return;
+      continue;
+    }
     if (open && is_within_a_step(step) && leave_half_a_step()) continue;
     if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
     bool take = open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;

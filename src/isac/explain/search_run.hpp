@@ -90,6 +90,8 @@ class Search {
   void choose_blocks(const Eigen::VectorXd& residual);
   ScreenOptions screen_options() const;
   void move_to(const Fit& fit);
+  /// What is large and missing hides that the sensors' zero wanders: beside it, that zero passes for further effects. The step is taken anew.
+  bool a_wandering_zero_was_hidden_by(const Step& step);
   /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
   void take_colour(const Eigen::VectorXd& left_over);
   /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.

@@ -59,6 +59,20 @@ void Search::take_colour(const Eigen::VectorXd& left_over) {
   move_to(found_.baseline);
 }
 
+bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
+  const auto wanders = [](const Weights& w) { return w.colour[static_cast<int>(Chain::kTorque)].wander > 0; };
+  if (colour_beside_best_ || step.trials.empty() || wanders(found_.weights)) return false;
+  const Eigen::VectorXd rows = unfiltered(data_, found_.weights, step.trials.front().residual);
+  Weights weights = found_.weights;
+  take_colours(data_, beside_generic_functions(data_, rows), weights);
+  if (!wanders(weights)) return false;
+  say(ranking_.id_of(step.trials.front()) +
+      " had hidden that the force sensors' zero wanders: once more beside it");
+  colour_beside_best_ = true;
+  take_colour(rows);
+  return true;
+}
+
 Weights Search::noise_of_what_is_left() const {
   Weights left = found_.weights;
   if (!found_.adequate) return left;
