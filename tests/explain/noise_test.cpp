@@ -49,6 +49,24 @@ Eigen::VectorXd noise(const Prepared& data, double white, double slow, double me
   return out;
 }
 
+TEST(LogLikelihood, is_largest_near_the_colour_that_the_noise_has) {
+  const Prepared data = rows_of_runs(6, 4000);
+  const Eigen::VectorXd rows = noise(data, 1, 0.5, 0.3, 0.4, 31);
+  const auto of = [&](double white, double slow, double memory, double wander) {
+    Weights weights;
+    weights.colour[0] = {white, slow, memory, wander};
+    weights.take(data);
+    return log_likelihood(data, weights, rows);
+  };
+  const double right = of(1, 0.5, 0.3, 0.4);
+  for (const double wrong : {of(1.9, 0, 0, 0), of(1.5, 0, 0, 0.4), of(1, 0.9, 0.3, 0), of(2, 0.5, 0.3, 0.4),
+                             of(1, 0.5, 3, 0.4), of(1, 0.02, 0.3, 0.4)})
+    EXPECT_LT(wrong, right - 5);
+  // White noise: −½ Σ (y²/w + ln w).
+  EXPECT_NEAR(of(2, 0, 0, 0),
+              -0.5 * (rows.squaredNorm() / 2 + static_cast<double>(data.rows.size()) * std::log(2.0)), 1e-6);
+}
+
 double correlation(const Prepared& data, const Eigen::VectorXd& x, std::size_t lag) {
   double product = 0, squares = 0;
   for (std::size_t i = lag; i < data.rows.size(); ++i) {

@@ -7,6 +7,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "tied_data.hpp"
 
 namespace isac::explain {
@@ -78,6 +79,39 @@ TEST(Judge, few_blocks_that_agree_are_significant_although_they_are_their_own_ya
     EXPECT_LT(screen.columns[0].T, std::sqrt(1.0 * kCarry) + 1e-9);  // below any limit of a whole search
     EXPECT_LT(screen.rare_p, 1e-4);
   }
+}
+
+/// What a refit of two amplitudes closes, in some blocks of `setting`: each row its own block, so that before = noise + a x₁ + b x₂.
+double p_of_two(const Setting& setting, double sigma, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.5, 1.5);
+  const auto n = static_cast<Eigen::Index>(kBlocks);
+  Eigen::VectorXd before(n);
+  Eigen::MatrixXd x = Eigen::MatrixXd::Zero(n, 2);
+  for (Eigen::Index b = 0; b < n; ++b) before[b] = normal(random);
+  for (Eigen::Index b = 0; b < static_cast<Eigen::Index>(kCarry); ++b) {
+    x(b * 10, 0) = uniform(random);
+    x(b * 10, 1) = b % 2 == 0 ? uniform(random) : -uniform(random);
+  }
+  before += sigma * (x.col(0) / x.col(0).norm() - x.col(1) / x.col(1).norm());
+  const Eigen::VectorXd after = before - x * estimate::least_squares(x, before);
+  return p_of_refit(setting.data, before, after);
+}
+
+TEST(PValueOfARefit, is_small_where_two_amplitudes_are_large_in_few_blocks) {
+  const Setting setting;
+  std::mt19937_64 random(7);
+  for (int i = 0; i < 50; ++i) EXPECT_LT(p_of_two(setting, 60, random), 1e-3);
+}
+
+// It counts one freedom less than the blocks, and two were fitted: the search asks it of what is five sigma only, and counts all columns.
+TEST(PValueOfARefit, of_noise_passes_no_search) {
+  const Setting setting;
+  std::mt19937_64 random(8);
+  constexpr int kDraws = 4000;
+  int passed = 0;
+  for (int i = 0; i < kDraws; ++i) passed += p_of_two(setting, 0, random) * 50 <= 0.005 ? 1 : 0;
+  EXPECT_LE(passed, 0.005 * kDraws);
 }
 
 constexpr unsigned kRuns = 10;

@@ -54,5 +54,27 @@ TEST(WanderingZero, is_not_taken_for_a_reading_that_is_clipped_in_one_run) {
   EXPECT_NEAR(e.effects.front().parameters.front().value, rig.force_most, 0.5);
 }
 
+// What relaxes within a minute is as slow as the zero, and passes for it until it is taken out.
+TEST(WanderingZero, hides_no_creep) {
+  const test::TiedRig rig{.spring = 0.15, .relaxes_in = 10, .zero_wander = 0.004};
+  const Explanation e = explained(rig, 700);
+  ASSERT_FALSE(e.effects.empty()) << e.summary;
+  EXPECT_EQ(e.effects.front().id, "creep") << e.summary;
+}
+
+// Beside an effect that had hidden it, the zero is no second effect.
+TEST(WanderingZero, that_a_threshold_had_hidden_is_no_second_effect) {
+  const test::TiedRig rig{.threshold = 0.4 * kPascalPerKgfCm2, .zero_wander = 0.008};
+  std::vector<PlannedRun> runs = day();
+  runs.push_back(test::clamped(30, 0.1, 1.0, 10));
+  runs.back().mean_pressure_kgcm2 = 1.1;
+  for (std::uint32_t first = 800; first < 1100; first += 100) {
+    const Explanation e = explain(test::record_all(rig, runs, first), HeldOut(),
+                                  {.rig = rig.facts(), .traces = false, .next_experiment = false});
+    ASSERT_EQ(e.effects.size(), 1U) << first << " " << e.summary;
+    EXPECT_EQ(e.effects.front().id, "threshold_pressure") << e.summary;
+  }
+}
+
 }  // namespace
 }  // namespace isac::explain

@@ -1,0 +1,67 @@
+// Days of the blind generator that isac-explain once missed, each for a reason of its own, judged again.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+namespace {
+
+struct Miss {
+  const char *tier, *noise, *effect, *seed, *answer, *was;
+};
+
+void PrintTo(const Miss& miss, std::ostream* out) {
+  *out << miss.tier << " " << miss.noise << " " << miss.effect << " " << miss.seed;
+}
+
+class Misses : public ::testing::TestWithParam<Miss> {};
+
+TEST_P(Misses, are_answered_rightly) {
+  const Miss& miss = GetParam();
+  const std::string bin = ISAC_BIN_DIR, results = (std::filesystem::temp_directory_path() /
+                                                   ("isac-misses-" + std::to_string(getpid()) + ".jsonl"))
+                                                      .string();
+  const std::string call = bin + "/blind_run --tier " + miss.tier + " --noise " + miss.noise + " --effect " +
+                           miss.effect + " --seed " + miss.seed + " --results " + results + " --explain " +
+                           bin + "/isac-explain > /dev/null 2>&1";
+  const int status = std::system(call.c_str());
+  std::string line;
+  std::getline(std::ifstream(results) >> std::ws, line);
+  std::filesystem::remove(results);
+  ASSERT_EQ(status, 0) << call;
+  // The answer is a text within the line, its quotation marks escaped.
+  std::string answer;
+  for (std::size_t i = 0; i < line.size(); ++i)
+    if (line[i] != '\\' && line[i] != ' ' && !(line[i] == 'n' && i > 0 && line[i - 1] == '\\'))
+      answer += line[i];
+  EXPECT_NE(answer.find(miss.answer), std::string::npos) << "it was: " << miss.was << "\n"
+                                                         << line.substr(0, 6000);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Once, Misses,
+    ::testing::Values(Miss{"clear", "quantised", "creep", "5101", R"("effects":[{"id":"creep")",
+                           "nothing, for it passed for slow noise of the forces"},
+                      Miss{"clear", "white", "gravity_imbalance", "5101",
+                           R"("effects":[{"id":"gravity_imbalance")",
+                           "nothing, for each of its two amplitudes was the other's noise in few blocks"},
+                      Miss{"clear", "quantised", "periodic_disturbance", "5101",
+                           R"("effects":[{"id":"periodic_disturbance")",
+                           "unknown, for functions of the signals made a tenth of it"},
+                      Miss{"clear", "white", "spikes", "5101", R"("effects":[{"id":"spikes")",
+                           "nothing, for they are nine standard deviations high"},
+                      Miss{"clear", "quantised", "dead_time", "5101", R"("effects":[{"id":"dead_time")",
+                           "how the recorder counts, for it is 1.055 samples"},
+                      Miss{"clear", "quantised", "asymmetric_hysteresis", "5101",
+                           R"("effects":[{"id":"asymmetric_hysteresis")",
+                           "hysteresis that is alike in both directions"},
+                      Miss{"clear", "quantised", "threshold_pressure", "5201",
+                           R"("verdict":"named")",
+                           "three effects, for it hid that the forces' zero wanders"},
+                      Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
+                           "nothing, for no function of the angle has fifteen waves"}));
+
+}  // namespace
