@@ -58,8 +58,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Miss{"clear", "quantised", "asymmetric_hysteresis", "5101",
                            R"("effects":[{"id":"asymmetric_hysteresis")",
                            "hysteresis that is alike in both directions"},
-                      Miss{"clear", "quantised", "threshold_pressure", "5201",
-                           R"("verdict":"named")",
+                      Miss{"clear", "quantised", "threshold_pressure", "5201", R"("verdict":"named")",
                            "three effects, for it hid that the forces' zero wanders"},
                       Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
                            "nothing, for no function of the angle has fifteen waves"}));
