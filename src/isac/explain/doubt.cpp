@@ -130,19 +130,25 @@ void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Pro
     }
 }
 
+namespace {
+
+void leave_unknown(Chain chain, const Label& label, Explanation& e) {
+  e.verdict = Verdict::kUnknown;
+  e.detected = true;
+  e.unknown = Unknown{};
+  e.unknown->subsystem = chain == Chain::kTorque ? "muscle" : chain == Chain::kMotion ? "joint" : "pcu";
+  e.unknown->signal = label.signal;
+  e.unknown->unit = label.unit;
+}
+
+}  // namespace
+
 void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
   if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
   const Moments moments = moments_of(data, found.model.residual);
   if (!moments.stand_out()) return;
   const Label label = label_of(data, moments.chain);
-  e.verdict = Verdict::kUnknown;
-  e.detected = true;
-  e.unknown = Unknown{};
-  e.unknown->subsystem = moments.chain == Chain::kTorque   ? "muscle"
-                         : moments.chain == Chain::kMotion ? "joint"
-                                                           : "pcu";
-  e.unknown->signal = label.signal;
-  e.unknown->unit = label.unit;
+  leave_unknown(moments.chain, label, e);
   e.summary = fmt::format(
       "In a few moments the {} is off as noise is nowhere else, most of all near {:.1f} s of {}, where "
       "the mean square is {:.0f} times the "
@@ -159,14 +165,7 @@ void look_at_curves(const Prepared& data, const Found& found, const ExplainOptio
       clearest_curve(data, found.weights, found.floors, found.model.residual, options.material, options.seed);
   if (!stands_out(curve)) return;
   const Label label = label_of(data, curve.chain);
-  e.verdict = Verdict::kUnknown;
-  e.detected = true;
-  e.unknown = Unknown{};
-  e.unknown->subsystem = curve.chain == Chain::kTorque   ? "muscle"
-                         : curve.chain == Chain::kMotion ? "joint"
-                                                         : "pcu";
-  e.unknown->signal = label.signal;
-  e.unknown->unit = label.unit;
+  leave_unknown(curve.chain, label, e);
   e.unknown->depends_on = {curve.variable};
   e.summary = fmt::format(
       "The {} depends on {} by a curve that neither an effect of the catalogue nor a function of the signals "
