@@ -11,7 +11,7 @@ namespace {
 constexpr double kAlpha = 0.001;
 constexpr double kFarOut =
     8;  // standard deviations of the white noise: alone so far out is no part of its tail
-constexpr double kLeastOut = 6.5;   // of them: none of 10⁶ differences of normal noise is so large
+constexpr double kLeastOut = 6.5;   // of them: 5.3 deviations of a difference, 1e-7 of normal noise
 constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors, and a tail may become fatter
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
 constexpr double kManyOrHigh = 0.25;  // of the white noise: what spikes hold for sure
