@@ -169,7 +169,7 @@ void look_at_curves(const Prepared& data, const Found& found, const ExplainOptio
   e.unknown->depends_on = {curve.variable};
   e.summary = fmt::format(
       "The {} depends on {} by a curve that neither an effect of the catalogue nor a function of the signals "
-      "is like: {:.2f} of the noise floor, and as regular as noise is not by {:.0f} standard deviations.",
+      "is like: {:.2f} of the noise floor, {:.0f} standard deviations beyond what noise does.",
       label.signal == "motion" ? "balance of the free joint's motion" : label.signal,
       variable_in_words(curve.variable, of_linear_axis(axis_unit("rad", data.baseline))), curve.size,
       curve.z);
