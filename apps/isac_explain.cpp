@@ -1,4 +1,6 @@
 // isac-explain: where simulation and measurement disagree, what is missing, and the proof (docs/reference/isac-explain.md).
+#include <malloc.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <string>
@@ -46,6 +48,11 @@ report::ExplainReportInput report_input(const explain::Explanation& answer, cons
 }
 
 int run(Words words) {
+#ifdef __GLIBC__
+  // Responses of a hundred thousand rows come and go: memory that was once given is kept, instead of page faults for each anew.
+  mallopt(M_MMAP_THRESHOLD, 1 << 30);
+  mallopt(M_TRIM_THRESHOLD, 1 << 30);
+#endif
   for (const std::string& path : {words.json, words.params, words.report, words.plan})
     apps::require_writable(path);
   words.hash = !words.params.empty();
