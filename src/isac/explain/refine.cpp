@@ -154,6 +154,29 @@ void try_other_stop(Projected& problem, const Hypothesis& hypothesis, const Eige
   }
 }
 
+/// Of two amplitudes that only their difference tells (the zeros of two forces that pull against each other) the fit may drive both to an end
+/// of their range. One that stands there is absent instead, where the other makes up for it.
+void leave_out_what_nothing_tells(Projected& problem, const Hypothesis& hypothesis,
+                                  const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
+                                  const std::vector<std::size_t>& free, int iterations, Eigen::VectorXd& x,
+                                  Refined& refined) {
+  constexpr double kAsWell = 1.0;  // weighted squares
+  for (Eigen::Index j = 0; j < x.size(); ++j) {
+    const std::size_t k = free[static_cast<std::size_t>(j)];
+    const double null = hypothesis.info().parameters[k].null_value, margin = 1e-6 * (upper[j] - lower[j]);
+    const bool at_end = x[j] <= lower[j] + margin || x[j] >= upper[j] - margin;
+    if (!hypothesis.amplitude[k] || null != 0 || !at_end || lower[j] >= 0 || upper[j] <= 0) continue;
+    Eigen::VectorXd low = lower, high = upper, without = x;
+    low[j] = high[j] = without[j] = 0;
+    BoundedFit fit =
+        bounded_fit(std::ref(problem), without, low, high, {.rounds = iterations, .tolerance = 1e-6});
+    if (fit.residual.size() == 0 || !(fit.residual.squaredNorm() < refined.loss + kAsWell)) continue;
+    x = fit.x;
+    refined.loss = fit.residual.squaredNorm();
+    refined.residual = std::move(fit.residual);
+  }
+}
+
 }  // namespace
 
 Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& start, int iterations) {
@@ -208,6 +231,7 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
       }
     }
   }
+  leave_out_what_nothing_tells(problem, hypothesis, lower, upper, free, iterations, x, refined);
   if (id == "end_stop") try_other_stop(problem, hypothesis, lower, upper, scale, iterations, x, refined);
   refined.values = start;
   for (Eigen::Index j = 0; j < m; ++j)
