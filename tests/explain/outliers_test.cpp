@@ -66,6 +66,17 @@ TEST(Outliers, are_not_their_own_yardstick_where_one_sample_in_140_is_one) {
   EXPECT_NEAR(o.height, 15, 0.5);  // median of 150 of standard deviation 1.22: four errors of 0.12
 }
 
+TEST(Outliers, are_found_where_many_are_hardly_beyond_the_tail) {
+  std::mt19937 random(25);
+  std::normal_distribution<double> gauss;
+  std::vector<double> x;
+  for (int k = 0; k < 90000; ++k) x.push_back(gauss(random) + (k % 1000 == 500 ? 8.5 : 0.0));
+  const Outliers o = find_outliers(std::vector<Series>{series_of(std::move(x))});
+  EXPECT_GE(o.count, 25U);  // of ninety; they hold less than a quarter of the noise
+  EXPECT_LE(o.count, 90U);
+  EXPECT_LT(o.rms, 0.25);
+}
+
 TEST(Outliers, does_not_take_a_step_or_a_gap_for_a_spike) {
   std::mt19937 random(23);
   std::normal_distribution<double> gauss;

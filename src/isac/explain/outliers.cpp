@@ -15,6 +15,7 @@ constexpr double kLeastOut = 6.5;   // of them: 5.3 deviations of a difference, 
 constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors, and a tail may become fatter
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
 constexpr double kManyOrHigh = 0.25;  // of the white noise: what spikes hold for sure
+constexpr std::size_t kManyForSure = 25;  // where a thousandth of one is expected
 constexpr double kAlike = 0.5;        // of the height: how far the neighbours may be apart
 
 /// d of every sample that has both neighbours; NaN elsewhere.
@@ -80,7 +81,7 @@ Outliers find_outliers(std::span<const Series> runs, double quantum) {
   const double tail = q98 * std::pow(std::log(static_cast<double>(size.size()) / kAlpha) / std::log(50.0),
                                      1 / (kLessBent * k));
   const Outliers lone = count_outliers(runs, std::max({tail, kLeastOut * white, 3 * quantum}));
-  if (lone.rms >= kManyOrHigh * white) return lone;
+  if (lone.rms >= kManyOrHigh * white || lone.count >= kManyForSure) return lone;
   // A few that are hardly beyond it may be a tail that bends the other way: then an exponential's end is asked for.
   const double b = std::max((q98 - q90) / std::log(5.0), q98 / std::log(50.0));
   const double end = q98 + b * std::log(0.02 * static_cast<double>(size.size()) / kAlpha);
