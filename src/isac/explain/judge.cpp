@@ -22,6 +22,7 @@ constexpr double kFewBlocks = 8, kShareOfBlocks = 0.25;
 constexpr double kBoundingBlocks = 25;
 constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
 constexpr int kBlocksElsewhere = 20;
+constexpr double kMostByChance = 2;  // deviations, of the largest of dozens of functions
 // Of the level at which something counts as found; and of what lies beyond it, where a share that seldom speaks would only keep p-values
 // from being uniform.
 constexpr double kShareOfEach = 0.5, kRareBeyond = 0.02;
@@ -110,8 +111,10 @@ class Elsewhere {
         norm2 += f.norm2[k][b];
         ++blocks;
       }
-      if (blocks >= kBlocksElsewhere && norm2 > 0.05 * f.norm2[k].sum() && score2 > found.largest * norm2)
-        found = {score2 / norm2, blocks};
+      if (blocks < kBlocksElsewhere || norm2 <= 0.05 * f.norm2[k].sum()) continue;
+      // The largest of many alike is too large by what chance makes of their maximum.
+      const double scatter = score2 / norm2 / (1 + kMostByChance * std::sqrt(2.0 / blocks));
+      if (scatter > found.largest) found = {scatter, blocks};
     }
     return found;
   }
