@@ -24,8 +24,8 @@ namespace isac::explain {
 [[nodiscard]] bool closes_little(const Gap& gap);
 
 /// Is what was named refuted by runs that it has not seen? `user`: the baseline that anyone would have fitted. `gap` gains the freed numbers
-/// where they decide.
-[[nodiscard]] bool is_refuted(const Predictor& predictor, const Found& found, const ModelPoint& user,
+/// where they decide, `found` a doubt where those runs say nothing.
+[[nodiscard]] bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user,
                               const Proof& proof, Chain chain, const ExplainOptions& options, Gap& gap);
 
 /// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.

@@ -16,7 +16,7 @@ constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one 
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
 // What noise has on one day in two hundred counts from a smaller size on, beside the joint that the catalogue is of: a motor's own remainder is 0.16.
-constexpr double kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.1;
+constexpr double kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
 }  // namespace
