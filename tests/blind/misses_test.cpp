@@ -60,6 +60,18 @@ INSTANTIATE_TEST_SUITE_P(
                            "hysteresis that is alike in both directions"},
                       Miss{"clear", "quantised", "threshold_pressure", "5201", R"("verdict":"named")",
                            "three effects, for it hid that the forces' zero wanders"},
+                      Miss{"faint", "white", "time_skew", "5101", R"("effects":[{"id":"time_skew")",
+                           "nothing, for it is within half a sample"},
+                      Miss{"faint", "quantised", "second_order_lag", "5101",
+                           R"("effects":[{"id":"second_order_lag")",
+                           "how the recorder counts, for it is like a dead time of 0.48 samples"},
+                      Miss{"faint", "coloured", "quadratic_damping", "5101",
+                           R"("effects":[{"id":"quadratic_damping")",
+                           "nothing, for its few blocks were held against the loudest of a hundred functions"},
+                      Miss{"faint", "coloured", "hysteresis", "5101", R"("effects":[{"id":"hysteresis")",
+                           "unknown, for the noise of held-out runs decided against it"},
+                      Miss{"faint", "quantised", "encoder_offset", "5101", R"("id":"encoder_offset")",
+                           "unknown, for what closed next to nothing stood first"},
                       Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
                            "nothing, for no function of the angle has fifteen waves"}));
 

@@ -70,6 +70,24 @@ TEST(HeldOut, leaves_nothing_without_doubt_that_a_wandering_zero_alone_made) {
   }
 }
 
+TEST(Clock, a_skew_within_half_a_sample_is_named_but_not_the_half_sample_of_a_recorder) {
+  const std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 2.5), test::by_hand(30, 0.4, 1.2),
+                                       test::free_in_steps(20, 1.7, 0.6), test::free_in_steps(20, 2.9, 0.4),
+                                       test::clamped(30, 0.1, 1.2, 6)};
+  for (const double skew : {0.0, 0.0007, 0.001}) {
+    const test::TiedRig rig{.skew = skew};
+    const Explanation e = explained(rig, day, 100, rig, 140);
+    if (skew == 0.0007) {
+      ASSERT_EQ(e.effects.size(), 1U) << e.summary;
+      EXPECT_EQ(e.effects.front().id, "time_skew");
+      EXPECT_NEAR(e.effects.front().parameters.front().value, skew, 0.08 * skew);
+    } else {
+      EXPECT_TRUE(e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial)
+          << skew << ": " << e.summary;
+    }
+  }
+}
+
 std::vector<series::Recording> both_pressures_off(std::vector<series::Recording> runs, double pascal) {
   for (series::Recording& run : runs)
     for (series::Column& column : run.columns)

@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::size_t kContenders = 16;     // of each screen
 constexpr double kConvention = 0.12;        // relative, of the encoder's half step
-constexpr double kConventionOfTime = 0.06;  // of a sample, or half of one: a dead time is fitted within 3 %
+// Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
+constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
+constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03;  // of a sample
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
 constexpr double kHardlyAnything =
@@ -34,6 +36,7 @@ Found Search::run() {
   move_to(found_.baseline);
   take_colour(place_.residual);
   if (!found_.wants_torque_of_free_runs) forward();
+  if (found_.adequate && found_.added.empty() && !found_.steps.empty()) doubt_the_clock();
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
   if (found_.added.size() > 1) swap_and_drop();
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
@@ -196,8 +199,11 @@ bool Search::is_convention(const Step& step) {
       continue;
     if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5, kConvention)) {
       tolerate(library_, data_, id, -0.5 * step_angle, 0.5 * step_angle);
-    } else if (id == "dead_time" && (near(t.values[0] / interval, 0.5, kConventionOfTime) ||
-                                     near(t.values[0] / interval, 1, kConventionOfTime))) {
+    } else if (const double within =
+                   std::min(kConventionOfTime + kErrorsOfTime / std::sqrt(std::max(1.0, units_closed(t))),
+                            kMostOfTime);
+               id == "dead_time" &&
+               (near(t.values[0] / interval, 0.5, within) || near(t.values[0] / interval, 1, within))) {
       tolerate(library_, data_, id, -interval, interval);
     } else {
       continue;
@@ -208,6 +214,38 @@ bool Search::is_convention(const Step& step) {
     return true;
   }
   return false;
+}
+
+void Search::doubt_the_clock() {
+  auto& tolerances = library_.tolerances;
+  const auto skew = std::find_if(tolerances.begin(), tolerances.end(),
+                                 [](const Hypothesis& h) { return h.id() == "time_skew"; });
+  if (skew == tolerances.end()) return;
+  const std::ptrdiff_t at = skew - tolerances.begin();
+  const double interval = data_.runs.front().interval,
+               shift = std::abs(found_.baseline.model.effects[static_cast<std::size_t>(at)].values[0]) / interval;
+  const Step& last = found_.steps.back();
+  const bool beyond = last.gate.significant && !last.trials.empty() &&
+                      active_of(last.trials.front()).hypothesis->effect == skew->effect;
+  if (!beyond && (shift < kHardlySkewed || std::abs(shift - 0.5) < kHalfASample)) return;
+  const Hypothesis tolerance = *skew;
+  const Found without_effect = found_;
+  const double blocks = data_.block_seconds;
+  tolerances.erase(skew);
+  responses_.forget();
+  found_.steps.clear();
+  found_.baseline = fit_baseline(predictor_, tolerances, found_.weights);
+  move_to(found_.baseline);
+  forward();
+  const bool told = std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
+    return library_.hypotheses[static_cast<std::size_t>(h)].effect == tolerance.effect;
+  });
+  if (told) return;
+  tolerances.insert(tolerances.begin() + at, tolerance);
+  found_ = without_effect;
+  responses_.forget();
+  cut_blocks(data_, blocks);
+  move_to(found_.model);
 }
 
 bool Search::is_within_a_step(const Step& step) const {

@@ -80,6 +80,9 @@ class Search {
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
   /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
   bool is_convention(const Step& step);
+  /// A skew within half a sample is tolerated, so that it stands for nothing else; where nothing else is missing and the skew is neither hardly
+  /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is.
+  void doubt_the_clock();
   /// Beside an effect, an offset of less than half a step is how the encoder is read.
   bool is_within_a_step(const Step& step) const;
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
@@ -114,6 +117,8 @@ class Search {
   Step screened_step();
   Step step_here() { return refitted(screened_step()); }
   Step refitted(Step step);
+  /// What closes next to nothing is not what shows so much: the best that closes enough stands first, where nothing rules it out.
+  void put_material_first(Step& step) const;
   /// What blocks agree on may still be no more than the noise's own model makes of the best of so many, where that noise is slow. (A first
   /// effect is given the benefit of three sigma: that noise is a model.)
   void leave_to_slow_noise(Step& step);

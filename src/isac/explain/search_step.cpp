@@ -206,6 +206,7 @@ Step Search::refitted(Step step) {
   });
   if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
   ranking_.rank(step.trials, place_.residual);
+  if (found_.added.empty()) put_material_first(step);
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
   const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
   step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
@@ -213,6 +214,20 @@ Step Search::refitted(Step step) {
       std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
   leave_to_slow_noise(step);
   return step;
+}
+
+void Search::put_material_first(Step& step) const {
+  std::vector<Trial>& trials = step.trials;
+  if (trials.empty() || trials.front().material >= options_.material || step.gate.size < options_.material)
+    return;
+  const auto first = std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {
+    return t.in_set && t.material >= options_.material;
+  });
+  if (first == trials.end()) return;
+  std::rotate(trials.begin(), first, first + 1);
+  ranking_.mark(trials);
+  for (Trial& t : trials) t.in_set = t.in_set && t.material >= options_.material;
+  Ranking::weigh(trials);
 }
 
 void Search::leave_to_slow_noise(Step& step) {
