@@ -67,5 +67,20 @@ TEST(Uncertainty, of_a_stop_that_no_run_reached_is_told_as_such_and_its_place_is
   EXPECT_EQ(u.effects[0][1].reason, "these runs do not tell it");
 }
 
+TEST(Uncertainty, of_two_zeros_of_which_only_the_difference_shows_leaves_the_others_theirs) {
+  const Day day(test::TiedRig{.offset = 0.006}, 100);
+  const Hypothesis& both = day.hypothesis("force_offset");
+  Hypothesis one = both;
+  one.free[1] = false;
+  const Uncertain u = day.beside(both, {0.1, -0.2}), alone = day.beside(one, {0.1, 0.0});
+  for (const Estimated& e : u.effects[0]) {
+    EXPECT_TRUE(std::isnan(e.std_error));
+    EXPECT_EQ(e.reason.rfind("only b1 − b2 = ", 0), 0U) << e.reason;
+  }
+  EXPECT_NEAR(u.effects[0][0].value - u.effects[0][1].value, alone.effects[0][0].value, 0.02);
+  for (const char* name : {"A", "B", "C", "D"})
+    EXPECT_NEAR(error_of(u.base, name) / error_of(alone.base, name), 1, 0.02) << name;
+}
+
 }  // namespace
 }  // namespace isac::explain

@@ -27,11 +27,16 @@ std::string joined(const std::vector<std::string>& words) {
 }
 
 std::string numbers_of(const Candidate& c) {
-  std::vector<std::string> words;
+  std::vector<const Estimated*> told;
   for (const Estimated& p : c.parameters)
-    if (std::isfinite(p.value))
-      words.push_back(with_error(p.name, p.value, p.std_error, p.unit) +
-                      (p.reason.empty() ? "" : " (" + p.reason + ")"));
+    if (std::isfinite(p.value)) told.push_back(&p);
+  std::vector<std::string> words;
+  for (std::size_t i = 0; i < told.size(); ++i) {
+    const Estimated& p = *told[i];
+    const bool once_more = i + 1 < told.size() && told[i + 1]->reason == p.reason;
+    words.push_back(with_error(p.name, p.value, p.std_error, p.unit) +
+                    (p.reason.empty() || once_more ? "" : " (" + p.reason + ")"));
+  }
   return joined(words);
 }
 

@@ -75,12 +75,12 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
   const bool says_nothing = freed.behind.separation < kTooLittle && freed.behind.t > 0 &&
                             gap.heldout_after <= kHardlyWorse * gap.heldout_before;
   if (slow && freed.first < freed.second &&
-      (says_nothing ||
-       (gap.heldout_after <= kWandersBy * gap.heldout_before && freed.behind.t >= kLikely))) {
+      (says_nothing || (gap.heldout_after <= kWandersBy * gap.heldout_before && freed.behind.t >= kLikely))) {
     if (says_nothing)
-      found.doubts.push_back(fmt::format(
-          "The held-out runs neither show nor refute it ({:.1f} sigma for it, freed of the noise's slow part).",
-          freed.behind.t));
+      found.doubts.push_back(
+          fmt::format("The held-out runs neither show nor refute it ({:.1f} sigma for it, freed of the "
+                      "noise's slow part).",
+                      freed.behind.t));
     free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;
   }

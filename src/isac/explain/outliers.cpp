@@ -14,9 +14,9 @@ constexpr double kFarOut =
 constexpr double kLeastOut = 6.5;   // of them: 5.3 deviations of a difference, 1e-7 of normal noise
 constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors, and a tail may become fatter
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
-constexpr double kManyOrHigh = 0.25;  // of the white noise: what spikes hold for sure
+constexpr double kManyOrHigh = 0.25;      // of the white noise: what spikes hold for sure
 constexpr std::size_t kManyForSure = 25;  // where a thousandth of one is expected
-constexpr double kAlike = 0.5;        // of the height: how far the neighbours may be apart
+constexpr double kAlike = 0.5;            // of the height: how far the neighbours may be apart
 
 /// d of every sample that has both neighbours; NaN elsewhere.
 template <class Take>

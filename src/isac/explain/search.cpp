@@ -12,8 +12,8 @@
 namespace isac::explain {
 namespace {
 
-constexpr std::size_t kContenders = 16;     // of each screen
-constexpr double kConvention = 0.12;        // relative, of the encoder's half step
+constexpr std::size_t kContenders = 16;  // of each screen
+constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03;  // of a sample
@@ -223,7 +223,8 @@ void Search::doubt_the_clock() {
   if (skew == tolerances.end()) return;
   const std::ptrdiff_t at = skew - tolerances.begin();
   const double interval = data_.runs.front().interval,
-               shift = std::abs(found_.baseline.model.effects[static_cast<std::size_t>(at)].values[0]) / interval;
+               shift =
+                   std::abs(found_.baseline.model.effects[static_cast<std::size_t>(at)].values[0]) / interval;
   const Step& last = found_.steps.back();
   const bool beyond = last.gate.significant && !last.trials.empty() &&
                       active_of(last.trials.front()).hypothesis->effect == skew->effect;

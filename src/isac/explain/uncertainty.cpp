@@ -1,6 +1,10 @@
 #include "isac/explain/uncertainty.hpp"
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "isac/estimate/block_covariance.hpp"
 #include "isac/estimate/linear_algebra.hpp"
@@ -24,6 +28,41 @@ void give_interval(Estimated& e, double error, double degrees, double range) {
   const double reach = error * series::student_t_limit(0.95, degrees);
   e.ci_low = e.value - reach;
   e.ci_high = e.value + reach;
+}
+
+/// Columns x of unit norm of which each brings something of its own. Later ones that the others make up for are left out, and their parameters
+/// keep their values: no error of another is the larger for what nothing shows.
+struct Independent {
+  std::vector<Eigen::Index> kept;
+  /// Of each column that was left out: the kept one that it is a multiple of, if there is one.
+  struct LeftOut {
+    Eigen::Index column = 0;
+    std::optional<Eigen::Index> like;
+    double correlation = 0;
+  };
+  std::vector<LeftOut> left_out;
+};
+
+Independent independent_of(const Eigen::MatrixXd& x) {
+  constexpr double kOfItsOwn = 1e-3, kMultiple = 0.999;
+  Independent out;
+  Eigen::MatrixXd q(x.rows(), x.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index j = 0; j < x.cols(); ++j) {
+    Eigen::VectorXd v = x.col(j);
+    for (int round = 0; round < 2; ++round) v -= q.leftCols(count) * (q.leftCols(count).transpose() * v);
+    if (v.norm() > kOfItsOwn) {
+      q.col(count++) = v.normalized();
+      out.kept.push_back(j);
+      continue;
+    }
+    Independent::LeftOut left{.column = j, .like = {}, .correlation = 0};
+    for (const Eigen::Index k : out.kept)
+      if (const double r = x.col(j).dot(x.col(k)); std::abs(r) > kMultiple)
+        left.like = k, left.correlation = r;
+    out.left_out.push_back(left);
+  }
+  return out;
 }
 
 }  // namespace
@@ -72,15 +111,17 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
       of_effect->reason = at_its_end ? kAtItsEnd : kNotTold;
     }
   }
-  const auto m = static_cast<Eigen::Index>(columns.size());
-  if (m == 0) return out;
+  if (columns.empty()) return out;
   // Columns of unit norm: H is then a matrix of correlations.
   std::vector<double> norm;
-  Eigen::MatrixXd x(slopes.rows(), m);
-  for (Eigen::Index j = 0; j < m; ++j) {
-    norm.push_back(slopes.col(columns[static_cast<std::size_t>(j)]).norm());
-    x.col(j) = slopes.col(columns[static_cast<std::size_t>(j)]) / norm.back();
+  Eigen::MatrixXd all(slopes.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    norm.push_back(slopes.col(columns[j]).norm());
+    all.col(static_cast<Eigen::Index>(j)) = slopes.col(columns[j]) / norm.back();
   }
+  const Independent told = independent_of(all);
+  const auto m = static_cast<Eigen::Index>(told.kept.size());
+  const Eigen::MatrixXd x = all(Eigen::all, told.kept);
   // The refit may have stopped short of its minimum: only what no parameter can still take is noise.
   const Eigen::VectorXd residual =
       fit.residual - x * estimate::solve_symmetric(x.transpose() * x, x.transpose() * fit.residual);
@@ -99,9 +140,18 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
     from = to;
   }
   const estimate::BlockCovariance v = estimate::block_covariance(blocks);
+  const auto coordinate = [&](Eigen::Index column) -> const Coordinate& {
+    return used[static_cast<std::size_t>(columns[static_cast<std::size_t>(column)])];
+  };
+  const auto si_per_unit = [&](const Coordinate& c) {
+    return fit.model.effects[static_cast<std::size_t>(c.effect)]
+        .hypothesis->info()
+        .parameters[c.component]
+        .si_per_unit;
+  };
   for (Eigen::Index j = 0; j < m; ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    const Coordinate& c = used[static_cast<std::size_t>(columns[at])];
+    const auto at = static_cast<std::size_t>(told.kept[static_cast<std::size_t>(j)]);
+    const Coordinate& c = coordinate(told.kept[static_cast<std::size_t>(j)]);
     if (c.tolerance) continue;
     const double error = std::sqrt(v.covariance(j, j)) * c.scale / norm[at],
                  degrees = v.degrees_of_freedom[j];
@@ -110,12 +160,37 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
       const BaseParameter& parameter = predictor.base()[b];
       give_interval(out.base[b], error / parameter.si_per_unit, degrees,
                     (parameter.upper - parameter.lower) / parameter.si_per_unit);
-    } else if (Estimated* told = effect_parameter(c)) {
+    } else if (Estimated* of_effect = effect_parameter(c)) {
       const Hypothesis& h = *fit.model.effects[static_cast<std::size_t>(c.effect)].hypothesis;
       const auto p = static_cast<std::size_t>(c.component);
-      const double unit = h.info().parameters[c.component].si_per_unit;
-      give_interval(*told, error / unit, degrees, (h.upper[p] - h.lower[p]) / unit);
+      const double unit = si_per_unit(c);
+      give_interval(*of_effect, error / unit, degrees, (h.upper[p] - h.lower[p]) / unit);
     }
+  }
+  for (const Independent::LeftOut& left : told.left_out) {
+    const Coordinate& c = coordinate(left.column);
+    if (c.tolerance) continue;
+    Estimated* of_effect = effect_parameter(c);
+    if (of_effect == nullptr) {
+      if (c.base >= 0) out.base[static_cast<std::size_t>(c.base)].reason = kNotTold;
+      continue;
+    }
+    of_effect->reason = kNotTold;
+    Estimated* like = left.like ? effect_parameter(coordinate(*left.like)) : nullptr;
+    if (like == nullptr || coordinate(*left.like).effect != c.effect || !std::isfinite(like->std_error))
+      continue;
+    // x_c = r x_k, each per unit of its parameter: only k + f c shows, f = r |∂/∂c|/|∂/∂k|.
+    constexpr double kOne = 0.05;
+    const Coordinate& k = coordinate(*left.like);
+    const double f = left.correlation *
+                     (norm[static_cast<std::size_t>(left.column)] / c.scale * si_per_unit(c)) /
+                     (norm[static_cast<std::size_t>(*left.like)] / k.scale * si_per_unit(k));
+    if (std::abs(std::abs(f) - 1) > kOne) continue;
+    of_effect->reason = like->reason =
+        fmt::format("only {} {} {} = {:.3g} ± {:.1g}{}{} is told", like->name, f > 0 ? "+" : "−",
+                    of_effect->name, like->value + (f > 0 ? 1 : -1) * of_effect->value, like->std_error,
+                    like->unit.empty() ? "" : " ", like->unit);
+    like->std_error = like->ci_low = like->ci_high = kNotKnown;
   }
   return out;
 }
