@@ -60,23 +60,24 @@ Constancy constancy_of(const Around& baseline, const Fit& fit, std::size_t effec
     return {.variation = kNone, .error = kNone};
   struct Piece {
     double score = 0, norm2 = 0;
+    double noise = 0;  ///< variance of the score where nothing varies
   };
+  const Colour* noise_of = baseline.weights->colour;  // the residual's own density would hold what varies
   std::map<std::pair<unsigned, long>, Piece> pieces;
-  double squares = 0, count = 0;
   for (Eigen::Index i = 0; i < x.size(); ++i) {
     const Row& row = data.rows[static_cast<std::size_t>(i)];
     if ((fit.model.effects[effect].hypothesis->chains & bit(row.chain)) == 0) continue;
     Piece& piece = pieces[{row.run, std::lround(data.runs[row.run].time[row.sample] / kPieceSeconds)}];
     piece.score += x[i] * fit.residual[i];
     piece.norm2 += x[i] * x[i];
-    squares += fit.residual[i] * fit.residual[i];
-    ++count;
+    piece.noise += noise_of[static_cast<int>(row.chain)].white * x[i] * x[i];
   }
-  double scores = 0, norms = 0, squared_norms = 0;
+  double scores = 0, noise = 0, noise2 = 0, squared_norms = 0;
   Piece greatest;
   const auto add = [&](const Piece& piece, double sign) {
     scores += sign * piece.score * piece.score;
-    norms += sign * piece.norm2;
+    noise += sign * piece.noise;
+    noise2 += sign * piece.noise * piece.noise;
     squared_norms += sign * piece.norm2 * piece.norm2;
   };
   for (const auto& [where, piece] : pieces) {
@@ -85,8 +86,7 @@ Constancy constancy_of(const Around& baseline, const Fit& fit, std::size_t effec
   }
   add(greatest, -1);
   if (!(squared_norms > 0)) return {.variation = kNone, .error = kNone};
-  const double unit = squares / count;
-  return {.variation = (scores - unit * norms) / squared_norms, .error = unit * std::sqrt(2 / squared_norms)};
+  return {.variation = (scores - noise) / squared_norms, .error = std::sqrt(2 * noise2) / squared_norms};
 }
 
 }  // namespace isac::explain

@@ -3,8 +3,8 @@
 /// what comes and goes is like it on the whole only, and giants that cancel are no explanation of a small gap.
 ///
 ///   x(s) = y_pred(a (1 + s)) − y_pred(a),  weighted, projected off the baseline's parameters
-///   x = x(0.01)/0.01;  over pieces of one second:  g_b = Σ x r,  w_b = Σ x²,  u = Σ r²/n
-///   v = (Σ g_b² − u Σ w_b) / Σ w_b²,   standard deviation of v where nothing varies: u √(2/Σ w_b²)
+///   x = x(0.01)/0.01;  over pieces of one second:  g_b = Σ x r,  w_b = Σ x²,  u_b = Σ s x², s the noise's density in the row's chain (weights.hpp's w)
+///   v = (Σ g_b² − Σ u_b) / Σ w_b²,   standard deviation of v where nothing varies: √(2 Σ u_b²)/Σ w_b²
 ///
 /// a: the effect's amplitudes; r = y_pred − y at the fit. If it is a (1 + δ_b) in piece b instead, with E δ² = v, then g_b = −δ_b w_b + noise: v
 /// is by how much of itself, squared, it varies. The greatest piece is left out of the sums: one misfit moment is no variation.

@@ -81,6 +81,7 @@ void Search::hold_against_itself() {
 void Search::look_at_remainder() {
   if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
   const double p = found_.steps.back().gate.p_value;
+  if (found_.steps.back().gate.significant && found_.steps.back().gate.material) return;  // told already
   const Gatekeeper::Sized left =
       gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
   const bool pressure = (bit(left.chain) & kPressureChains) != 0;

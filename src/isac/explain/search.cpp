@@ -7,6 +7,7 @@
 #include <set>
 
 #include "isac/explain/gate.hpp"
+#include "isac/explain/labels.hpp"
 #include "isac/explain/search_run.hpp"
 
 namespace isac::explain {
@@ -133,6 +134,7 @@ void Search::forward() {
       }
     }
     if (open && !take && found_.added.size() == 1 && a_rival_goes_better_with(step)) continue;
+    if (open && !take && !found_.added.empty()) leave_elsewhere(step);
     found_.steps.push_back(std::move(step));
     if (take) {
       const Trial& best = found_.steps.back().trials.front();
@@ -147,6 +149,16 @@ void Search::forward() {
     }
     if (!take) return;
   }
+}
+
+void Search::leave_elsewhere(const Step& step) {
+  if (leaves_over_in(bit(step.gate.chain)) || step.gate.size >= kSecondOfFloor) return;
+  found_.adequate = true;
+  found_.doubts.push_back(fmt::format(
+      "Something more is missing in other readings, {:.2f} of the noise floor of the {} (p = {:.1g}), "
+      "and too little to be named.",
+      step.gate.size, label_of(data_, step.gate.chain).signal, step.gate.p_value));
+  say(found_.doubts.back());
 }
 
 bool Search::is_open(const Step& step) const {

@@ -75,6 +75,8 @@ class Search {
   unsigned chains_of(const Trial& t) const {
     return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains;
   }
+  /// What is left in rows that have nothing to do with those of the name, too little to be named, casts a doubt and takes no name away.
+  void leave_elsewhere(const Step& step);
   /// Of an effect that a tolerance took its share of, with that share.
   double whole_size(const Trial& t) const;
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
