@@ -41,9 +41,11 @@ TEST(HeldOut, does_not_refute_a_name_where_a_zero_wanders_by_more_than_the_effec
   const test::TiedRig rig{.asymmetry = 0.02, .zero_wander = 0.02}, other{.zero_wander = 0.02};
   const Explanation same = explained(rig, day_of(40), 100, rig, 140);
   ASSERT_GT(same.gap.heldout_after, 1.5 * same.gap.heldout_before) << "this is the day that is asked for";
-  EXPECT_EQ(same.verdict, Verdict::kNamed) << same.summary;
+  // Without pretension a gain of the forces is what unequal muscles are: the set may hold it.
+  EXPECT_NE(same.verdict, Verdict::kUnknown) << same.summary;
   ASSERT_EQ(same.effects.size(), 1U);
   EXPECT_EQ(same.effects.front().id, "muscle_asymmetry");
+  for (const Candidate& c : same.alternatives) EXPECT_EQ(c.id, "force_gain_error");
   EXPECT_LT(same.gap.freed_after, 0.99 * same.gap.freed_before);
   EXPECT_NE(same.summary.find("freed of the noise's slow part"), std::string::npos) << same.summary;
   // Runs that lack the effect refute it all the same.

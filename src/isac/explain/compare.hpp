@@ -9,6 +9,7 @@
 /// Source: Hansen, Lunde and Nason 2011 for the idea of a set; docs/derivations/explain.md.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "isac/explain/fit.hpp"
@@ -40,6 +41,12 @@ inline constexpr double kTwinLimit = 3.0;
 
 [[nodiscard]] inline bool cannot_rule_out(const Comparison& c) {
   return c.t < kSetLimit || c.separation < kTwinLimit;
+}
+
+/// What is told of t: between two that the data hardly hold apart no more than lies between them. The rest is the price of parameters, which
+/// grows beyond all bounds where next to nothing does.
+[[nodiscard]] inline double told_behind(const Comparison& c) {
+  return c.separation < kTwinLimit ? std::min(c.t, c.separation) : c.t;
 }
 
 }  // namespace isac::explain

@@ -106,7 +106,7 @@ Place place_of(const Library& library, const Found& found, const Candidate& c, b
     for (const Trial& t : step.trials)
       if (&t != &step.trials.front() && t.in_set == in_set &&
           library.hypotheses[static_cast<std::size_t>(t.hypothesis)].id() == c.id &&
-          std::abs(t.behind.t - c.behind_best) <= 1e-9 * (1 + std::abs(t.behind.t)))
+          std::abs(told_behind(t.behind) - c.behind_best) <= 1e-9 * (1 + std::abs(c.behind_best)))
         return {&step, &t};
   return {};
 }
@@ -171,7 +171,7 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
       c.evidence.push_back(
           {false, fmt::format("{} fits only {} sigma worse; {} sigma of data lie between them. "
                               "What would tell: {}.",
-                              rival.term, rounded(std::max(0.0, t.behind.t), 2),
+                              rival.term, rounded(std::max(0.0, told_behind(t.behind)), 2),
                               rounded(t.behind.separation, 2), h.info().told_apart_by)});
       continue;
     }
@@ -185,7 +185,7 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
     const std::string fails = where_it_fails(data, best, t);
     c.evidence.push_back(
         {true, fmt::format("It is told from {} ({}) by {} sigma{}.", rival.term, h.info().told_apart_by,
-                           rounded(t.behind.t, 2), fails.empty() ? "" : "; " + fails)});
+                           rounded(told_behind(t.behind), 2), fails.empty() ? "" : "; " + fails)});
     break;
   }
 }
@@ -203,14 +203,14 @@ void evidence_of_rival(const Predictor& predictor, const Library& library, const
     c.evidence.push_back(
         {true, fmt::format("It fits only {} sigma worse than {}; {} sigma of data lie between their "
                            "predictions. What would tell: {}.",
-                           rounded(std::max(0.0, place.trial->behind.t), 2), winner.term,
+                           rounded(std::max(0.0, told_behind(place.trial->behind)), 2), winner.term,
                            rounded(place.trial->behind.separation, 2), own.told_apart_by)});
   } else {
     c.evidence.push_back(
         {false, nests(own.id, winner.id)
                     ? fmt::format("Its special case, {}, says as much with fewer numbers.", winner.term)
-                    : fmt::format("It fits {} sigma worse than {}.", rounded(place.trial->behind.t, 2),
-                                  winner.term)});
+                    : fmt::format("It fits {} sigma worse than {}.",
+                                  rounded(told_behind(place.trial->behind), 2), winner.term)});
   }
   if (!fails.empty()) c.evidence.push_back({false, fmt::format("Where it falls short: {}.", fails)});
 }

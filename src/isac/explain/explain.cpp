@@ -32,7 +32,7 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
   c.subsystem = subsystem_name(h.info().where);
   c.equation = h.info().equation;
   c.confidence = confidence;
-  c.behind_best = trial.behind.t;
+  c.behind_best = told_behind(trial.behind);
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto& p = h.info().parameters[i];
     Estimated e;

@@ -83,8 +83,8 @@ void Search::report(const std::vector<Trial>& trials) {
                                   units_closed(t), t.material)
         : t.in_set
             ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
-                          ranking_.id_of(best), t.behind.t, t.behind.separation)
-            : fmt::format("ruled out: {:.1f} sigma behind {}", t.behind.t, ranking_.id_of(best));
+                          ranking_.id_of(best), told_behind(t.behind), t.behind.separation)
+            : fmt::format("ruled out: {:.1f} sigma behind {}", told_behind(t.behind), ranking_.id_of(best));
     found_.notes.push_back({ranking_.id_of(t), sentence});
     say(ranking_.id_of(t) + ": " + sentence);
   }
