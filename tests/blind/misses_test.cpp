@@ -59,6 +59,8 @@ INSTANTIATE_TEST_SUITE_P(
              R"("effects":[{"id":"asymmetric_hysteresis")", "hysteresis that is alike in both directions"},
         Miss{"clear", "quantised", "threshold_pressure", "5201", R"("verdict":"named")",
              "three effects, for it hid that the forces' zero wanders"},
+        Miss{"clear", "quantised", "asymmetric_hysteresis", "5601", R"("id":"asymmetric_hysteresis")",
+             "hysteresis alone, for its offset was how the encoder is read"},
         Miss{"faint", "white", "time_skew", "5101", R"("effects":[{"id":"time_skew")",
              "nothing, for it is within half a sample"},
         Miss{"faint", "quantised", "second_order_lag", "5101", R"("effects":[{"id":"second_order_lag")",

@@ -119,7 +119,10 @@ void Search::forward() {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }
-    if (open && is_within_a_step(step) && leave_half_a_step()) continue;
+    if (open && is_within_a_step(step) && leave_half_a_step()) {
+      keep_what_holds_an_offset();
+      continue;
+    }
     if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
     bool take = open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
     if (take) {
@@ -266,6 +269,16 @@ bool Search::is_within_a_step(const Step& step) const {
     return t.in_set && ranking_.id_of(t) == "encoder_offset" &&
            std::abs(t.values[0]) < 0.5 * data_.rig.angle_step;
   });
+}
+
+void Search::keep_what_holds_an_offset() {
+  for (Step& s : found_.steps) {
+    if (s.trials.empty()) continue;
+    const std::string first = ranking_.id_of(s.trials.front());
+    for (Trial& t : s.trials)
+      if (nests(ranking_.id_of(t), first) && nests(ranking_.id_of(t), "torque_offset")) t.in_set = true;
+    Ranking::weigh(s.trials);
+  }
 }
 
 bool Search::leave_half_a_step() {

@@ -87,6 +87,9 @@ class Search {
   void doubt_the_clock();
   /// Beside an effect, an offset of less than half a step is how the encoder is read.
   bool is_within_a_step(const Step& step) const;
+  /// An offset that is left to how the encoder is read may be part of a general case of what was named: a hysteresis that differs by direction is
+  /// one that does not and an offset. It stays in the set.
+  void keep_what_holds_an_offset();
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
   /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.)
   bool leave_half_a_step();
