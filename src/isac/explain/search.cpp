@@ -17,7 +17,7 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
-constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03;  // of a sample
+constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
 constexpr double kHardlyAnything =
@@ -240,10 +240,8 @@ void Search::doubt_the_clock() {
   const double interval = data_.runs.front().interval,
                shift =
                    std::abs(found_.baseline.model.effects[static_cast<std::size_t>(at)].values[0]) / interval;
-  const Step& last = found_.steps.back();
-  const bool beyond = last.gate.significant && !last.trials.empty() &&
-                      active_of(last.trials.front()).hypothesis->effect == skew->effect;
-  if (!beyond && (shift < kHardlySkewed || std::abs(shift - 0.5) < kHalfASample)) return;
+  const bool at_bound = shift > 0.499;
+  if (shift < kHardlySkewed || (!at_bound && shift > 0.5 - kHalfASample)) return;
   const Hypothesis tolerance = *skew;
   const Found without_effect = found_;
   const double blocks = data_.block_seconds;
@@ -253,9 +251,13 @@ void Search::doubt_the_clock() {
   found_.baseline = fit_baseline(predictor_, tolerances, found_.weights);
   move_to(found_.baseline);
   forward();
-  const bool told = std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
-    return library_.hypotheses[static_cast<std::size_t>(h)].effect == tolerance.effect;
-  });
+  // At its bound it may be any skew from half a sample on: how large it is, the effect's own fit says, to a twentieth.
+  const bool told =
+      std::any_of(found_.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found_.model.tolerances),
+                  found_.model.model.effects.end(), [&](const Active& a) {
+                    return a.hypothesis->effect == tolerance.effect &&
+                           (!at_bound || std::abs(a.values[0]) > kBeyond * interval);
+                  });
   if (told) return;
   tolerances.insert(tolerances.begin() + at, tolerance);
   found_ = without_effect;
