@@ -1,5 +1,7 @@
 // isac-explain: where simulation and measurement disagree, what is missing, and the proof (docs/reference/isac-explain.md).
+#ifdef __linux__
 #include <malloc.h>
+#endif
 
 #include <CLI/CLI.hpp>
 #include <cstdint>

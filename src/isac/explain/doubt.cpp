@@ -73,6 +73,7 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
   if (!worse || (gap.heldout_after <= kAbout * gap.heldout_before && freed.behind.t >= kHardly)) return false;
   // Where held-out rows hold too little of a faint effect to tell, slow noise decides and says nothing.
   const bool says_nothing = freed.behind.separation < kTooLittle && freed.behind.t > 0 &&
+                            freed.behind.t < kLikely &&
                             gap.heldout_after <= kHardlyWorse * gap.heldout_before;
   if (slow && freed.first < freed.second &&
       (says_nothing || (gap.heldout_after <= kWandersBy * gap.heldout_before && freed.behind.t >= kLikely))) {
