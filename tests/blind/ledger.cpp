@@ -73,6 +73,8 @@ json write_answer(const Answer& a) {
   if (a.p_value >= 0.0) w.object["p_value"] = a.p_value;  // all digits: it is one of a grid's (p_distance)
   w.add("heldout_before", a.heldout_before);
   w.add("heldout_after", a.heldout_after);
+  w.add("freed_before", a.freed_before);
+  w.add("freed_after", a.freed_after);
   w.add("seconds", a.seconds);
   return w.object;
 }
@@ -114,6 +116,8 @@ Answer read_answer(const json& j) {
   a.p_value = j.value("p_value", -1.0);
   a.heldout_before = j.value("heldout_before", 0.0);
   a.heldout_after = j.value("heldout_after", 0.0);
+  a.freed_before = j.value("freed_before", 0.0);
+  a.freed_after = j.value("freed_after", 0.0);
   a.seconds = j.value("seconds", 0.0);
   if (a.confidences.size() != a.effects.size() || a.subsystems.size() != a.effects.size())
     throw std::runtime_error("a line of the ledger has not one confidence and subsystem for each effect");

@@ -88,6 +88,8 @@ Answer read_answer(const std::string& text) {
       a.signal = gap.value("signal", "");
       a.heldout_before = number(gap, "heldout_before");
       a.heldout_after = number(gap, "heldout_after");
+      a.freed_before = number(gap, "freed_before");
+      a.freed_after = number(gap, "freed_after");
     }
   } catch (const json::exception& wrong) {
     a.failed = std::string("an answer that lacks something: ") + wrong.what();

@@ -33,6 +33,8 @@ struct Answer {
   std::vector<std::string> subsystems;                        ///< of `effects`
   double p_value = -1;                                        ///< over the whole search; −1: not given
   double heldout_before = 0, heldout_after = 0, seconds = 0;  ///< zero when not given
+  double freed_before = 0,
+         freed_after = 0;  ///< the same, freed of the noise's slow part; zero when not given
 };
 
 struct Case {

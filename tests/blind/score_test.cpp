@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "ledger.hpp"
+#include "numbers.hpp"
 
 namespace blind {
 namespace {
@@ -120,6 +121,29 @@ TEST(Score, measures_the_closed_gap_against_the_same_day_with_nothing_hidden) {
   EXPECT_NEAR(judge_case(one).closed, (25.0 - 16.0) / (25.0 - 9.0), 1e-12);
   one.answer.heldout_before = 0.0302;  // hardly above it: nothing to be measured by
   EXPECT_EQ(judge_case(one).closed, -1.0);
+}
+
+TEST(Score, tells_a_held_out_rms_that_rises_by_the_noises_doing_from_one_that_rises_in_earnest) {
+  Case one = single("creep");
+  one.truth.ratio = 0.75;
+  one.answer = named({"creep"});
+  one.answer.signal = "torque";
+  one.answer.heldout_before = 0.03;
+  one.answer.heldout_after = 0.031;
+  const auto worse = [&] {
+    const std::string text = report({one});
+    const std::size_t row = text.find("| clear |", text.find("## Gap closed"));
+    return text.substr(row, text.find('\n', row) - row);
+  };
+  const std::string all = share(1, 1), none = share(0, 1);
+  EXPECT_TRUE(worse().ends_with(all + " | " + all + " |")) << worse();
+  one.truth.gap_closes["driven"] = -7e-5;  // the true model's rises more: 0.031² − 0.03² = 6.1e-5
+  EXPECT_TRUE(worse().ends_with(all + " | " + none + " |")) << worse();
+  one.truth.gap_closes["driven"] = -5e-5;
+  EXPECT_TRUE(worse().ends_with(all + " | " + all + " |")) << worse();
+  one.answer.freed_before = 0.021;
+  one.answer.freed_after = 0.02;
+  EXPECT_TRUE(worse().ends_with(all + " | " + none + " |")) << worse();
 }
 
 TEST(Score, reads_a_line_of_results_and_survives_an_answer_that_is_none) {
@@ -247,6 +271,8 @@ TEST(Ledger, is_scored_as_the_whole_answer_is) {
   cases[0].answer.signal = "torque";
   cases[0].answer.heldout_before = 0.0223;
   cases[0].answer.heldout_after = 0.0201;
+  cases[0].answer.freed_before = 0.0121;
+  cases[0].answer.freed_after = 0.0111;
   cases[0].answer.seconds = 3.25;
   cases[1] = cases[0];
   cases[1].floor = {{"torque", 0.02}};
