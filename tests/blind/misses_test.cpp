@@ -72,6 +72,10 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"faint", "quantised", "encoder_offset", "5101", R"("id":"encoder_offset")",
              "unknown, for what closed next to nothing stood first"},
         Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
-             "nothing, for no function of the angle has fifteen waves"}));
+             "nothing, for no function of the angle has fifteen waves"},
+        Miss{"leave-one-out", "coloured", "threshold_pressure", "5901", R"("verdict":"unknown")",
+             "nothing, for it passed for a zero that would wander by more than the readings hold"},
+        Miss{"leave-one-out", "coloured", "second_order_lag", "5901", R"("verdict":"not_separable")",
+             "dead time, for what that leaves over was taken as told"}));
 
 }  // namespace

@@ -72,6 +72,18 @@ TEST(HeldOut, leaves_nothing_without_doubt_that_a_wandering_zero_alone_made) {
   }
 }
 
+// Noise of one kind is as slow in every run; what wanders in one only would pass for noise of all, and hide.
+TEST(SlowNoise, that_one_run_alone_has_is_unknown_and_not_nothing) {
+  const test::TiedRig rig, other{.zero_wander = 0.02};
+  std::vector<series::Recording> runs = test::record_all(rig, day_of(40), 600);
+  runs[4] = test::record_all(other, day_of(40), 600)[4];
+  const Explanation e = explain(std::move(runs), HeldOut(test::record_all(rig, kBeyond, 640)),
+                                {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kUnknown) << e.summary;
+  EXPECT_NE(e.summary.find("in run604.csv"), std::string::npos) << e.summary;
+  EXPECT_TRUE(e.effects.empty());
+}
+
 TEST(Clock, a_skew_within_half_a_sample_is_named_but_not_the_half_sample_of_a_recorder) {
   const std::vector<PlannedRun> day = {test::by_hand(30, 0.5, 2.5), test::by_hand(30, 0.4, 1.2),
                                        test::free_in_steps(20, 1.7, 0.6), test::free_in_steps(20, 2.9, 0.4),

@@ -157,6 +157,82 @@ void leave_unknown(Chain chain, const Label& label, Explanation& e) {
 
 }  // namespace
 
+namespace {
+
+struct SlowRun {
+  double times_usual = 0;  ///< mean square of its steps over the median of all runs
+  double step = 0;         ///< their rms, in σ
+  std::size_t run = 0;
+};
+
+/// The driven run in which what is left of the torque moves most from one bin of 2 s to the next: noise is as slow in all of them.
+SlowRun most_moving_run(const Prepared& data, const Eigen::VectorXd& left) {
+  constexpr double kBin = 2.0;  // s
+  constexpr std::size_t kFewestSteps = 8, kFewestRuns = 4;
+  std::vector<std::pair<double, std::size_t>> moves;  // mean square, run
+  for (std::size_t first = 0; first < data.rows.size();) {
+    const unsigned of = data.rows[first].run;
+    const PreparedRun& run = data.runs[of];
+    std::vector<double> sum, count;
+    std::size_t i = first;
+    for (; i < data.rows.size() && data.rows[i].run == of; ++i) {
+      if (data.rows[i].chain != Chain::kTorque || run.is_free) continue;
+      const auto bin = static_cast<std::size_t>(run.time[data.rows[i].sample] / kBin);
+      if (bin >= sum.size()) sum.resize(bin + 1, 0.0), count.resize(bin + 1, 0.0);
+      sum[bin] += left[static_cast<Eigen::Index>(i)];
+      ++count[bin];
+    }
+    first = i;
+    const double full = count.empty() ? 0.0 : 0.5 * *std::max_element(count.begin(), count.end());
+    double squares = 0;
+    std::size_t steps = 0;
+    for (std::size_t b = 1; b < sum.size(); ++b) {
+      if (count[b] < full || count[b - 1] < full) continue;
+      const double step = sum[b] / count[b] - sum[b - 1] / count[b - 1];
+      squares += step * step;
+      ++steps;
+    }
+    if (steps >= kFewestSteps) moves.emplace_back(squares / static_cast<double>(steps), of);
+  }
+  if (moves.size() < kFewestRuns) return {};
+  std::sort(moves.begin(), moves.end());
+  const double usual = moves[moves.size() / 2].first;
+  return {usual > 0 ? moves.back().first / usual : 0.0, std::sqrt(moves.back().first), moves.back().second};
+}
+
+}  // namespace
+
+void look_at_slow_noise(const Prepared& data, const Found& found, double material, Explanation& e) {
+  constexpr double kMostRange = 1.5;  // 1.21 at most in 150 datasets of a zero that does wander
+  constexpr double kFarMore = 8;      // 2.5 at most in 18 datasets of three kinds of noise
+  if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
+  if (!data.has(Chain::kTorque)) return;
+  const Label label = label_of(data, Chain::kTorque);
+  const auto c = static_cast<int>(Chain::kTorque);
+  const double slow = label.scale * found.floors.slow[c];
+  const SlowRun most = most_moving_run(data, unfiltered(data, found.weights, found.model.residual));
+  for (const SignalGap& s : e.signals) {
+    if (s.signal != label.signal) continue;
+    std::string why;
+    if (slow > kMostRange * s.rmse)
+      why = fmt::format(
+          "as a sensor's zero does that wanders by {:.3g} {}, and stays within {:.3g} {}: that is no zero",
+          slow, s.unit, s.rmse, s.unit);
+    else if (most.times_usual > kFarMore &&
+             most.step * found.weights.sigma[c] > material * found.floors.white[c])
+      why = fmt::format("in {} {:.0f} times as much as in other runs, in power", data.runs[most.run].name,
+                        most.times_usual);
+    if (why.empty()) continue;
+    leave_unknown(Chain::kTorque, label, e);
+    e.summary = fmt::format(
+        "What is left of the {} moves from second to second {}. Something slow is missing, and neither an "
+        "effect of the "
+        "catalogue nor a function of the signals fits it.",
+        label.signal, why);
+    return;
+  }
+}
+
 void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
   if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
   const Moments moments = moments_of(data, found.model.residual);

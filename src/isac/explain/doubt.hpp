@@ -8,7 +8,8 @@
 ///                 more that rms_after ≤ rms_before: two things are missing, and one of them was not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, or leaves over what chance seldom does (remainder.cpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too, or a few moments that hold what noise holds
-///                 nowhere else (moments.hpp)
+///                 nowhere else (moments.hpp), or slow noise that is none: by its steps a zero (memory 100 s) that would wander by more than 1.5
+///                 times the rms, or steps from one bin of 2 s to the next of eight times the mean square of the median run
 ///
 /// t: compare.hpp's, of the user's baseline behind the named model. Units: the answer's. Threads: pure. Errors: none.
 /// Source: docs/derivations/explain.md.
@@ -33,6 +34,10 @@ void doubt(const Predictor& predictor, const Found& found, Explanation& e);
 
 /// A model that is right for the fitted runs and far off on the others lacks what only those excite.
 void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Proof& proof, Explanation& e);
+
+/// What passes for slow noise, and would wander by more than the readings hold or moves one run far more than the others, is unknown and not
+/// nothing.
+void look_at_slow_noise(const Prepared& data, const Found& found, double material, Explanation& e);
 
 /// What shows in a few moments only, and fits no name and no function of the signals, is unknown and not nothing.
 void look_at_moments(const Prepared& data, const Found& found, Explanation& e);

@@ -234,6 +234,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   describe(predictor, library, found, proof, options, e);
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
+  look_at_slow_noise(data, found, options.material, e);
   look_at_moments(data, found, e);
   look_at_curves(data, found, options, e);
   return e;

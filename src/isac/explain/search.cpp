@@ -92,6 +92,7 @@ void Search::report(const std::vector<Trial>& trials) {
 
 void Search::forward() {
   first_size_ = largest_size_ = largest_units_ = 0;
+  left_elsewhere_ = false;
   for (;;) {
     const bool narrow = !found_.added.empty() && !look_.contenders.empty();
     if (narrow) asked_for_ = look_.contenders;
@@ -156,7 +157,7 @@ void Search::forward() {
 
 void Search::leave_elsewhere(const Step& step) {
   if (leaves_over_in(bit(step.gate.chain)) || step.gate.size >= kSecondOfFloor) return;
-  found_.adequate = true;
+  found_.adequate = left_elsewhere_ = true;
   found_.doubts.push_back(fmt::format(
       "Something more is missing in other readings, {:.2f} of the noise floor of the {} (p = {:.1g}), "
       "and too little to be named.",

@@ -174,7 +174,8 @@ class Search {
   double first_size_ = 0;  ///< of the first effect, over the floor
   double largest_size_ =
       0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
-  double largest_units_ = 0;  ///< of noise that one of them closed
+  double largest_units_ = 0;     ///< of noise that one of them closed
+  bool left_elsewhere_ = false;  ///< and told so
   bool a_rival_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
