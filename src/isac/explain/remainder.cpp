@@ -15,8 +15,9 @@ constexpr double kGiant = 8;  // of what all effects close together, one by itse
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
-// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred.
-constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06;
+// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred, and
+// the effect is not so strong that its equation's own error shows.
+constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06, kStrong = 2;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
 }  // namespace
@@ -85,9 +86,9 @@ void Search::look_at_remainder() {
   const Gatekeeper::Sized left =
       gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
   const bool pressure = (bit(left.chain) & kPressureChains) != 0;
-  const double of_torque = !data_.baseline.terms.empty() ? kWorthDoubting
-                           : p <= kSeldom                ? kWorthDoubtingIfSeldom
-                                                         : kWorthDoubtingOfTheJoint;
+  const double of_torque = !data_.baseline.terms.empty()           ? kWorthDoubting
+                           : p <= kSeldom && first_size_ < kStrong ? kWorthDoubtingIfSeldom
+                                                                   : kWorthDoubtingOfTheJoint;
   if (p > kDoubtful || left.size < (pressure ? kWorthDoubtingOfPressure : of_torque) * first_size_) return;
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
