@@ -280,6 +280,31 @@ TEST(QuietVelocity, does_not_pass_an_encoders_steps_for_less_damping_and_some_fr
             0.5 * narrow);  // at some speeds the steps beat with the samples: slow, and no kernel helps
 }
 
+TEST(QuietVelocity, leaves_nothing_of_a_hands_reversals_that_passes_for_a_memory_of_the_velocity) {
+  // What is left, along the velocity of the last 0.1 s less the velocity.
+  const double step = 2 * kPi / 8000, interval = 0.002, stay = std::exp(-interval / 0.1);
+  double along = 0, squares = 0;
+  for (int start = 0; start < 8; ++start) {
+    std::vector<double> angle, velocity;
+    double true_angle = 0.37 * start * step;
+    for (int k = 0; k < 10000; ++k) {
+      velocity.push_back(1.5 * std::tanh(6 * std::sin(kPi * interval * k)));  // turns within 0.15 s
+      angle.push_back(step * (std::floor(true_angle / step) + 0.5));
+      true_angle += interval * 1.5 * std::tanh(6 * std::sin(kPi * interval * (k + 0.5)));
+    }
+    const std::vector<double> exact = low_pass(velocity, 3), quiet = quiet_velocity(angle, 3, interval, step);
+    double remembered = 0;
+    for (std::size_t k = 0; k + 100 < exact.size(); ++k) {
+      remembered = stay * remembered + (1 - stay) * exact[k];
+      if (k < 100) continue;
+      const double memory = remembered - exact[k];
+      along += memory * (quiet[k] - exact[k]);
+      squares += memory * memory;
+    }
+  }
+  EXPECT_LT(std::abs(along / squares), 1e-4);  // with the second moment alone 3.9e-4
+}
+
 TEST(QuietVelocity, follows_a_quick_motion_as_the_narrow_kernel_does) {
   const double step = 2 * kPi / 8000, turn = 2 * kPi * 4;
   std::vector<double> angle, exact;
