@@ -197,7 +197,9 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
     in.own_angle = low_pass(truth, sigma);
     in.own_velocity = quiet_velocity(truth, sigma, dt, data_->rig.angle_step * ratio);
     in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
-    if (slow) in.own_slow_acceleration = low_pass_derivative(truth, data_->smoothing.motion / dt, dt, 2);
+    if (slow)
+      in.own_slow_acceleration =
+          quiet_acceleration(truth, data_->smoothing.motion / dt, dt, data_->rig.angle_step * ratio);
   }
   in.angle = &in.own_angle;
   in.velocity = &in.own_velocity;

@@ -18,9 +18,10 @@ namespace {
 constexpr double kKernelReach =
     6.0;                          // standard deviations: what is cut off the second derivative is below 1e-6
 constexpr double kRowRate = 125;  // Hz: beyond it the kernel has left nothing
-constexpr double kTurningWindow = 0.08;  // s to either side
-constexpr double kWideKernel = 0.020;    // s, for velocities that the encoder resolves badly
-constexpr double kQuietKernel = 0.015;   // s, for velocities that change slowly
+constexpr double kTurningWindow = 0.08;               // s to either side
+constexpr double kWideKernel = 0.020;                 // s, for velocities that the encoder resolves badly
+constexpr double kQuietKernel = 0.015;                // s, for velocities that change slowly
+constexpr double kQuietKernelOfAcceleration = 0.030;  // s, beside a narrow one of 0.020 s
 constexpr double kSlack = 2.0,
                  kCarries = 20.0;  // N: a sensor that carries this much as a rule and reads less hangs slack
 constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
@@ -177,7 +178,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     if (run.is_free) {
       run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
       undo_lag(run.slow_torque, smoothing.motion / dt);
-      run.slow_acceleration = low_pass_derivative(run.raw_angle, smoothing.motion / dt, dt, 2);
+      run.slow_acceleration = quiet_acceleration(run.raw_angle, smoothing.motion / dt, dt, rig.angle_step);
     }
   }
   // Rows beside gaps and edges see through the kernel what is not there.
@@ -362,17 +363,19 @@ std::vector<double> low_pass_derivative(std::span<const double> x, double sigma,
   return out;
 }
 
-std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma, double interval,
-                                   double angle_step) {
-  std::vector<double> out = low_pass_derivative(raw_angle, sigma, interval, 1);
-  const double wide_sigma = kQuietKernel / interval;
+namespace {
+
+/// The derivative of an encoder's reading by a wider kernel, where what it differs by from the narrow one's is no more than the steps make.
+std::vector<double> quiet_derivative(std::span<const double> raw_angle, double sigma, double wide_sigma,
+                                     double interval, double angle_step, int order) {
+  std::vector<double> out = low_pass_derivative(raw_angle, sigma, interval, order);
   if (!(std::isfinite(angle_step) && angle_step > 0) || wide_sigma <= sigma) return out;
   // w = g_w′ ∗ φ, u = 1 − g_w∗: w + (1 − α) u w + ½ (1 − α)(2 − α) u² w, α = σ²/σ_w², the beginning of (1 − u)^(α−1) w, has the second and the
   // fourth moment of g: a smooth motion passes it as it passes g′. (With the second alone a hand's reversals left 8e-5 N m s of a velocity that
   // is remembered for 0.1 s, two sigma in every day.)
-  const std::vector<double> wide = low_pass_derivative(raw_angle, wide_sigma, interval, 1),
-                            wider = wide_low_pass(wide, wide_sigma),
-                            widest = wide_low_pass(wider, wide_sigma);
+  const std::vector<double> wide = low_pass_derivative(raw_angle, wide_sigma, interval, order),
+                            wider = low_pass(wide, wide_sigma),
+                            widest = low_pass(wider, wide_sigma);
   const double bend = 1 - sigma * sigma / (wide_sigma * wide_sigma), second = 0.5 * bend * (1 + bend);
   std::vector<double> slow(wide.size()), difference(wide.size());
   for (std::size_t k = 0; k < slow.size(); ++k) {
@@ -380,12 +383,24 @@ std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sig
     difference[k] = (out[k] - slow[k]) * (out[k] - slow[k]);
   }
   const std::vector<double> power = wide_low_pass(difference, 2 * wide_sigma);
-  double gain = 0;  // of white noise by g′
-  for (const double g : gaussian(std::max(sigma, 1.0), 1)) gain += g * g;
-  const double expected = angle_step * angle_step / 12 * gain / (interval * interval);
+  double gain = 0;  // of white noise by the derivative
+  for (const double g : gaussian(std::max(sigma, 1.0), order)) gain += g * g;
+  const double expected = angle_step * angle_step / 12 * gain / std::pow(interval, 2 * order);
   for (std::size_t k = 0; k < slow.size(); ++k)
     out[k] = slow[k] + std::clamp((power[k] / expected - 1.5) / 1.5, 0.0, 1.0) * (out[k] - slow[k]);
   return out;
+}
+
+}  // namespace
+
+std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma, double interval,
+                                   double angle_step) {
+  return quiet_derivative(raw_angle, sigma, kQuietKernel / interval, interval, angle_step, 1);
+}
+
+std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma, double interval,
+                                       double angle_step) {
+  return quiet_derivative(raw_angle, sigma, kQuietKernelOfAcceleration / interval, interval, angle_step, 2);
 }
 
 std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity,

@@ -149,6 +149,9 @@ void cut_blocks(Prepared& data, double block_seconds);
 /// for less damping, and what D φ̇ then lacks for friction. (No step known: g′ ∗ φ.)
 [[nodiscard]] std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma_samples,
                                                  double interval, double angle_step);
+/// g″ ∗ φ by the same way: the steps are in the balance of the motion twice, where an inertia is looked for.
+[[nodiscard]] std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma_samples,
+                                                     double interval, double angle_step);
 /// Velocity that can be told from standing still; see the head of this file.
 [[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle,
                                                std::span<const double> velocity, double interval,
