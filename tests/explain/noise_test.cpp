@@ -324,6 +324,40 @@ TEST(QuietVelocity, follows_a_quick_motion_as_the_narrow_kernel_does) {
   EXPECT_EQ(quiet_velocity(angle, 3, 0.002, std::nan("")), narrow);
 }
 
+TEST(QuietAcceleration, carries_less_of_the_encoders_steps_and_follows_a_quick_motion) {
+  const double step = 2 * kPi / 8000, interval = 0.002, sigma = 0.020;
+  struct Noise {
+    double quiet = 0, narrow = 0, along = 0, squares = 0;
+  };
+  const auto noise_of = [&](double hertz) {
+    const double turn = 2 * kPi * hertz;
+    std::vector<double> angle, exact;
+    for (int k = 0; k < 10000; ++k) {
+      const double t = interval * k;
+      angle.push_back(step *
+                      (std::floor((0.4 * std::sin(turn * t) + 0.002 * std::sin(37 * t)) / step) + 0.5));
+      exact.push_back(-0.4 * turn * turn * std::sin(turn * t) * std::exp(-0.5 * turn * turn * sigma * sigma) -
+                      0.002 * 37 * 37 * std::sin(37 * t) * std::exp(-0.5 * 37 * 37 * sigma * sigma));
+    }
+    const std::vector<double> quiet = quiet_acceleration(angle, sigma / interval, interval, step),
+                              narrow = low_pass_derivative(angle, sigma / interval, interval, 2);
+    Noise n;
+    for (std::size_t k = 200; k + 200 < exact.size(); ++k) {
+      n.quiet += (quiet[k] - exact[k]) * (quiet[k] - exact[k]);
+      n.narrow += (narrow[k] - exact[k]) * (narrow[k] - exact[k]);
+      n.along += (quiet[k] - exact[k]) * exact[k];
+      n.squares += exact[k] * exact[k];
+    }
+    return n;
+  };
+  const Noise slow = noise_of(0.5), quick = noise_of(4);
+  EXPECT_LT(slow.quiet, 0.7 * slow.narrow);
+  EXPECT_LT(quick.quiet, 1.2 * quick.narrow);
+  EXPECT_LT(std::abs(slow.along),
+            4e-3 * slow.squares);  // a swing of 2 mrad at 6 Hz is hardly more than the steps
+  EXPECT_LT(std::abs(quick.along), 1e-3 * quick.squares);
+}
+
 /// Runs of the tied rig whose pressure readings carry slow noise, felt by the torque or not.
 std::vector<series::Recording> with_slow_pressure_noise(bool felt) {
   const test::TiedRig rig;
