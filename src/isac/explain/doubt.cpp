@@ -211,7 +211,7 @@ void look_at_slow_noise(const Prepared& data, const Found& found, double materia
   const auto c = static_cast<int>(Chain::kTorque);
   const double slow = label.scale * found.floors.slow[c];
   const SlowRun most = most_moving_run(data, unfiltered(data, found.weights, found.model.residual));
-  for (const SignalGap& s : e.signals) {
+  for (SignalGap& s : e.signals) {
     if (s.signal != label.signal) continue;
     std::string why;
     if (slow > kMostRange * s.rmse)
@@ -224,6 +224,8 @@ void look_at_slow_noise(const Prepared& data, const Found& found, double materia
                         most.times_usual);
     if (why.empty()) continue;
     leave_unknown(Chain::kTorque, label, e);
+    s.noise_floor = label.scale * found.floors.white[c];  // the slow part is what is missing
+    if (e.gap.signal == s.signal) e.gap.noise_floor = s.noise_floor;
     e.summary = fmt::format(
         "What is left of the {} moves from second to second {}. Something slow is missing, and neither an "
         "effect of the "

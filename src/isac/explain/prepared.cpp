@@ -374,8 +374,7 @@ std::vector<double> quiet_derivative(std::span<const double> raw_angle, double s
   // fourth moment of g: a smooth motion passes it as it passes g′. (With the second alone a hand's reversals left 8e-5 N m s of a velocity that
   // is remembered for 0.1 s, two sigma in every day.)
   const std::vector<double> wide = low_pass_derivative(raw_angle, wide_sigma, interval, order),
-                            wider = low_pass(wide, wide_sigma),
-                            widest = low_pass(wider, wide_sigma);
+                            wider = low_pass(wide, wide_sigma), widest = low_pass(wider, wide_sigma);
   const double bend = 1 - sigma * sigma / (wide_sigma * wide_sigma), second = 0.5 * bend * (1 + bend);
   std::vector<double> slow(wide.size()), difference(wide.size());
   for (std::size_t k = 0; k < slow.size(); ++k) {
