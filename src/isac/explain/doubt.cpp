@@ -155,10 +155,6 @@ void leave_unknown(Chain chain, const Label& label, Explanation& e) {
   e.unknown->unit = label.unit;
 }
 
-}  // namespace
-
-namespace {
-
 struct SlowRun {
   double times_usual = 0;  ///< mean square of its steps over the median of all runs
   double step = 0;         ///< their rms, in σ
@@ -228,8 +224,7 @@ void look_at_slow_noise(const Prepared& data, const Found& found, double materia
     if (e.gap.signal == s.signal) e.gap.noise_floor = s.noise_floor;
     e.summary = fmt::format(
         "What is left of the {} moves from second to second {}. Something slow is missing, and neither an "
-        "effect of the "
-        "catalogue nor a function of the signals fits it.",
+        "effect of the catalogue nor a function of the signals fits it.",
         label.signal, why);
     return;
   }
