@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "isac/explain/filters.hpp"
 #include "isac/series/recording.hpp"
 
 namespace isac::explain {
@@ -42,8 +43,7 @@ struct BaselineModel {
 
 enum class Chain : unsigned char { kTorque = 0, kPressure1 = 1, kPressure2 = 2, kMotion = 3 };
 inline constexpr int kChains = 4;
-inline constexpr double kAtomSeconds = 2.0;   ///< the shortest block
-inline constexpr double kSlowestStep = 0.05;  ///< s per encoder step: slower is standing still
+inline constexpr double kAtomSeconds = 2.0;  ///< the shortest block
 
 struct PreparedRun {
   bool recorded = true;  ///< false: planned, its signals are a model's
@@ -124,37 +124,5 @@ class HeldOut {
 void add_torque_of_free_runs(Prepared& data);
 /// Joins atoms to blocks of about this length anew.
 void cut_blocks(Prepared& data, double block_seconds);
-
-/// A signal low-passed widely where what is lost is noise, narrowly where it moves.
-[[nodiscard]] std::vector<double> quieten(std::span<const double> raw, std::span<const double> narrow,
-                                          double sigma_samples, double wide_sigma_samples,
-                                          double white_noise);
-/// Standard deviation of white noise of one sample, from differences that a smooth signal does not pass.
-[[nodiscard]] double white_noise(std::span<const std::vector<double>* const> signals);
-
-/// Weights of g, or of its first or second derivative per sample: exact on the polynomial that each must be exact on.
-[[nodiscard]] std::vector<double> gaussian(double sigma_samples, int derivative);
-/// Σ g_k x_{i+k} with the weights centred at i; the ends are continued by their last value.
-[[nodiscard]] double centred_sum(std::span<const double> weights, std::span<const double> x, std::size_t i);
-/// g ∗ x at the samples asked for (every `stride`-th from `first`); the ends are continued by their last value.
-[[nodiscard]] std::vector<double> low_pass(std::span<const double> x, double sigma_samples,
-                                           std::size_t first = 0, std::size_t stride = 1);
-/// The same for a wide Gaussian, as three running means, whose cost does not grow with its width; its variance is that of the
-/// Gaussian to a part in a hundred.
-[[nodiscard]] std::vector<double> wide_low_pass(std::span<const double> x, double sigma_samples);
-/// (g′ ∗ x)/Δt and (g″ ∗ x)/Δt².
-[[nodiscard]] std::vector<double> low_pass_derivative(std::span<const double> x, double sigma_samples,
-                                                      double interval, int order);
-/// g′ ∗ φ, and a wider kernel without its bend where what the two differ by is the encoder's steps: damping times their noise would pass
-/// for less damping, and what D φ̇ then lacks for friction. (No step known: g′ ∗ φ.)
-[[nodiscard]] std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma_samples,
-                                                 double interval, double angle_step);
-/// g″ ∗ φ by the same way: the steps are in the balance of the motion twice, where an inertia is looked for.
-[[nodiscard]] std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma_samples,
-                                                     double interval, double angle_step);
-/// Velocity that can be told from standing still; see the head of this file.
-[[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle,
-                                               std::span<const double> velocity, double interval,
-                                               double angle_step);
 
 }  // namespace isac::explain
