@@ -76,6 +76,16 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"leave-one-out", "coloured", "threshold_pressure", "5901", R"("verdict":"unknown")",
              "nothing, for it passed for a zero that would wander by more than the readings hold"},
         Miss{"leave-one-out", "coloured", "second_order_lag", "5901", R"("verdict":"not_separable")",
-             "dead time, for what that leaves over was taken as told"}));
+             "dead time, for what that leaves over was taken as told"},
+        Miss{"leave-one-out", "coloured", "hysteresis", "5901", R"("verdict":"not_separable")",
+             "a hysteresis that differs by direction, whose directions were alike"},
+        Miss{"leave-one-out", "coloured", "cubic_stiffness", "5901", R"("verdict":"not_separable")",
+             "a lever arm that varies, for functions without a name were as good but not better"},
+        Miss{"leave-one-out", "coloured", "force_offset", "5901", R"("verdict":"not_separable")",
+             "gains of both forces, of which neither was told by itself"},
+        Miss{"leave-one-out", "real", "lever_arm_variation", "5901", R"("verdict":"not_separable")",
+             "two effects that it is confused with"},
+        Miss{"leave-one-out", "real", "dead_time", "5901", R"("verdict":"not_separable")",
+             "a lag of second order, for it left little over"}));
 
 }  // namespace

@@ -87,9 +87,11 @@ void add_signals(const Predictor& predictor, const Found& found, Explanation& e)
   }
 }
 
-void add_numbers(const Predictor& predictor, const Found& found, Explanation& e) {
+void add_numbers(const Predictor& predictor, const Found& found, const std::optional<Uncertain>& numbers,
+                 Explanation& e) {
   const Fit& fit = told_model(found, e);
-  const Uncertain after = uncertainties(predictor, fit, found.weights);
+  const Uncertain after =
+      numbers && &fit == &found.model ? *numbers : uncertainties(predictor, fit, found.weights);
   e.base = after.base;
   for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
     if (after.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = after.effects[i];
@@ -280,9 +282,9 @@ std::string summary_of(const Explanation& e) {
 }
 
 void describe(const Predictor& predictor, const Library& library, const Found& found, const Proof& proof,
-              const ExplainOptions& options, Explanation& e) {
+              const ExplainOptions& options, const std::optional<Uncertain>& numbers, Explanation& e) {
   const Chain chain = chain_of(predictor.data(), e.gap.signal);
-  add_numbers(predictor, found, e);
+  add_numbers(predictor, found, numbers, e);
   tell_in_units_of(predictor.data().baseline, e);
   add_signals(predictor, found, e);
   add_waterfall(predictor, library, found, proof, chain, e);

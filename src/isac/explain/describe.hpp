@@ -8,14 +8,19 @@
 /// Coulomb friction, T_c = 0.0141 ± 0.0006 N m, takes it to 0.0112 N m on held-out runs."
 #pragma once
 
+#include <optional>
+#include <string>
+
 #include "isac/explain/explain.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/search.hpp"
+#include "isac/explain/uncertainty.hpp"
 
 namespace isac::explain {
 
+/// `numbers`: of found.model, if they are known already.
 void describe(const Predictor& predictor, const Library& library, const Found& found, const Proof& proof,
-              const ExplainOptions& options, Explanation& e);
+              const ExplainOptions& options, const std::optional<Uncertain>& numbers, Explanation& e);
 
 /// Evidence for and against each candidate of the explanation (evidence.cpp).
 void add_evidence(const Predictor& predictor, const Library& library, const Found& found, Explanation& e);

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
@@ -13,10 +16,12 @@
 #include "isac/explain/doubt.hpp"
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/number_doubts.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
+#include "isac/explain/uncertainty.hpp"
 #include "isac/explain/unknown.hpp"
 #include "isac/explain/where.hpp"
 
@@ -212,6 +217,14 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
   if (is_refuted(predictor, found, user, proof, chain, options, e.gap)) e.verdict = Verdict::kUnknown;
+  std::optional<Uncertain> numbers;
+  if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
+    numbers = uncertainties(predictor, found.model, found.weights);
+    for (std::size_t i = 0; i < found.added.size(); ++i)
+      for (std::string& why : doubts_of_numbers(
+               library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]))
+        found.doubts.push_back(std::move(why));
+  }
   if (e.verdict == Verdict::kUnknown) {
     leave_unnamed(predictor, found, e);
   } else if (!e.effects.empty() && (!found.doubts.empty() || closes_little(e.gap))) {
@@ -231,7 +244,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
            std::any_of(e.alternatives.begin(), e.alternatives.end(), is) ||
            std::any_of(e.rejected.begin(), e.rejected.end(), is);
   });
-  describe(predictor, library, found, proof, options, e);
+  describe(predictor, library, found, proof, options, numbers, e);
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
   look_at_slow_noise(data, found, options.material, e);

@@ -1,24 +1,44 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "isac/explain/constancy.hpp"
 #include "isac/explain/generic_fit.hpp"
+#include "isac/explain/labels.hpp"
 #include "isac/explain/search_run.hpp"
 
 namespace isac::explain {
 namespace {
 
-constexpr double kBeaten = 1.645;                     // sigma, by functions without a name
+constexpr double kBeaten = 1.645;  // sigma, by functions without a name
+// Sigma more than chance has seldom: were the name right, functions would be half of what lies between the two behind.
+constexpr double kCloserThanChance = 1.645;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
-constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03;
+constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
+                 kWorthDoubtingOfPressureIfSeldom = 0.015;
 // Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred, and
 // the effect is not so strong that its equation's own error shows.
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06, kStrong = 2;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
+
+/// Does the catalogue say that these two are taken for one another?
+bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo& b) {
+  const auto names = [](const models::EffectInfo& effect, std::string_view id) {
+    const std::string_view list = effect.confused_with;
+    for (std::size_t from = 0; from < list.size();) {
+      const std::size_t to = std::min(list.find(", ", from), list.size());
+      if (list.substr(from, to - from) == id) return true;
+      from = to + 2;
+    }
+    return false;
+  };
+  return names(a, b.id) || names(b, a.id);
+}
 
 }  // namespace
 
@@ -43,6 +63,11 @@ void Search::hold_against_functions() {
         "may be one thing, and neither of them.",
         behind.separation));
   if (behind.t < kBeaten || behind.separation < kTwinLimit) {
+    if (behind.separation >= kTwinLimit && behind.t > kCloserThanChance - 0.5 * behind.separation)
+      found_.doubts.push_back(fmt::format(
+          "Functions without a name do as well, or nearly: they are {:.1f} sigma {}, where {:.1f} sigma "
+          "of data lie between.",
+          std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
     say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
                     names, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
     return;
@@ -89,7 +114,8 @@ void Search::look_at_remainder() {
   const double of_torque = !data_.baseline.terms.empty()           ? kWorthDoubting
                            : p <= kSeldom && first_size_ < kStrong ? kWorthDoubtingIfSeldom
                                                                    : kWorthDoubtingOfTheJoint;
-  if (p > kDoubtful || left.size < (pressure ? kWorthDoubtingOfPressure : of_torque) * first_size_) return;
+  const double of_pressure = p <= kSeldom ? kWorthDoubtingOfPressureIfSeldom : kWorthDoubtingOfPressure;
+  if (p > kDoubtful || left.size < (pressure ? of_pressure : of_torque) * first_size_) return;
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, left.size));
@@ -111,6 +137,16 @@ void Search::look_at_limits() {
       found_.doubts.push_back(
           fmt::format("By {} both sensors err by the same: one cause of both is likelier than two.", id));
   }
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      const auto info = [&](std::size_t at) -> const models::EffectInfo& {
+        return library_.hypotheses[static_cast<std::size_t>(found_.added[at])].info();
+      };
+      if (taken_for_one_another(info(i), info(k)))
+        found_.doubts.push_back(
+            fmt::format("{} and {} are like one another: one effect that is neither may look like both.",
+                        upper_first(info(k).term), info(i).term));
+    }
   if (found_.added.size() >= kMany)
     found_.doubts.push_back(fmt::format(
         "It takes {} effects together: one that none of them is may look like that.", found_.added.size()));
