@@ -87,5 +87,20 @@ TEST(Outliers, does_not_take_a_step_or_a_gap_for_a_spike) {
   EXPECT_EQ(find_outliers(runs).count, 0U);
 }
 
+// A command jumps, the pressure begins to move from one sample to the next, and a prediction of a smoothed pressure rounds that corner.
+TEST(Outliers, are_not_the_corners_that_a_smoothed_signal_rounds) {
+  std::mt19937 random(26);
+  std::normal_distribution<double> gauss;
+  std::vector<double> x;
+  for (int k = 0; k < 90000; ++k) {
+    const int from_corner = std::abs(k % 1000 - 500);
+    x.push_back(gauss(random) + 60 * std::exp(-0.3 * from_corner));
+  }
+  std::vector<Series> runs = {series_of(x)};
+  EXPECT_EQ(find_outliers(runs).count, 0U);
+  for (std::size_t k = 250; k < runs.front().value.size(); k += 1000) runs.front().value[k] += 20;
+  EXPECT_EQ(find_outliers(runs).count, 90U);
+}
+
 }  // namespace
 }  // namespace isac::explain

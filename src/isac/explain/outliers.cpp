@@ -16,21 +16,18 @@ constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors,
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
 constexpr double kManyOrHigh = 0.25;      // of the white noise: what spikes hold for sure
 constexpr std::size_t kManyForSure = 25;  // where a thousandth of one is expected
-constexpr double kAlike = 0.5;            // of the height: how far the neighbours may be apart
+constexpr double kAlike = 0.5;            // of the height: how far the neighbours may be apart, or off theirs
 
-/// d of every sample that has both neighbours; NaN elsewhere.
-template <class Take>
-void for_each_difference(std::span<const Series> runs, Take&& take) {
-  for (const Series& run : runs)
-    for (std::size_t k = 1; k + 1 < run.value.size(); ++k) {
-      const double before = run.value[k - 1], here = run.value[k], after = run.value[k + 1];
-      const double d = here - 0.5 * (before + after);
-      if (std::isfinite(d)) take(d, before, after);
-    }
+double difference(const std::vector<double>& x, std::size_t k) {
+  return x[k] - 0.5 * (x[k - 1] + x[k + 1]);
 }
 
-bool alone(double d, double before, double after) {
-  return std::abs(after - before) < kAlike * std::abs(d);
+/// Does sample k, d off its neighbours, stand alone? They are near each other and, both together, near theirs: a corner that a model rounds is
+/// a peak of several samples.
+bool alone(const std::vector<double>& x, std::size_t k, double d) {
+  const double most = kAlike * std::abs(d);
+  if (!(std::abs(x[k + 1] - x[k - 1]) < most)) return false;
+  return k < 2 || k + 2 >= x.size() || !(std::abs(0.5 * (x[k - 1] + x[k + 1] - x[k - 2] - x[k + 2])) >= most);
 }
 
 }  // namespace
@@ -40,12 +37,15 @@ Outliers count_outliers(std::span<const Series> runs, double limit) {
   out.limit = limit;
   std::vector<double> heights;
   double squares = 0;
-  for_each_difference(runs, [&](double d, double before, double after) {
-    ++out.samples;
-    if (std::abs(d) <= limit || !alone(d, before, after)) return;
-    heights.push_back(std::abs(d));
-    squares += d * d;
-  });
+  for (const Series& run : runs)
+    for (std::size_t k = 1; k + 1 < run.value.size(); ++k) {
+      const double d = difference(run.value, k);
+      if (!std::isfinite(d)) continue;
+      ++out.samples;
+      if (std::abs(d) <= limit || !alone(run.value, k, d)) continue;
+      heights.push_back(std::abs(d));
+      squares += d * d;
+    }
   out.count = heights.size();
   if (out.count > 0) {
     out.height = series::median(heights);
@@ -63,15 +63,12 @@ Outliers find_outliers(std::span<const Series> runs, double quantum) {
   std::vector<double> size;
   for (const Series& run : runs) {
     std::vector<char> beside(run.value.size(), 0);
-    const auto difference = [&](std::size_t k) {
-      return run.value[k] - 0.5 * (run.value[k - 1] + run.value[k + 1]);
-    };
     for (std::size_t k = 1; k + 1 < run.value.size(); ++k)
-      if (const double d = difference(k);
-          std::abs(d) > kFarOut * white && alone(d, run.value[k - 1], run.value[k + 1]))
+      if (const double d = difference(run.value, k); std::abs(d) > kFarOut * white && alone(run.value, k, d))
         beside[k - 1] = beside[k] = beside[k + 1] = 1;
     for (std::size_t k = 1; k + 1 < run.value.size(); ++k)
-      if (const double d = difference(k); std::isfinite(d) && beside[k] == 0) size.push_back(std::abs(d));
+      if (const double d = difference(run.value, k); std::isfinite(d) && beside[k] == 0)
+        size.push_back(std::abs(d));
   }
   if (size.size() < 1000) return {};
   const double q90 = series::quantile(size, 0.90), q98 = series::quantile(size, 0.98);

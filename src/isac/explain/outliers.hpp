@@ -1,7 +1,8 @@
 /// @file
 /// Single samples that stand out of what a model leaves over: spikes of a reading.
 ///
-///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other
+///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other,
+///     |(x_{k−1} + x_{k+1} − x_{k−2} − x_{k+2})/2| < |d|/2: where a command jumps, a smoothed pressure rounds the torque's corner, which is no spike
 ///   limit = max(q98 (ln(N/α)/ln 50)^(1/(0.96 k)), 6.5 s, 3 quanta),  k = ln(ln 50/ln 10)/ln(q98/q90), 0.5 ≤ k ≤ 1.6
 ///
 /// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: the tail ln(1/S) = (x/a)^k that passes through both is continued
