@@ -34,9 +34,9 @@ std::string Ranking::id_of(const Trial& t) const {
   return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
 }
 
-bool Ranking::is_limit_case(const Trial& t) const {
-  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
-  if (std::string_view(h.info().id) == "stribeck_friction" && t.values[1] < kHardlyMore * t.values[0])
+bool Ranking::is_limit_case(int hypothesis, const Values& values) const {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(hypothesis)];
+  if (std::string_view(h.info().id) == "stribeck_friction" && values[1] < kHardlyMore * values[0])
     return true;
   for (int i = 0; i < h.info().parameter_count; ++i) {
     const auto k = static_cast<std::size_t>(i);
@@ -45,8 +45,8 @@ bool Ranking::is_limit_case(const Trial& t) const {
     // The loss is flat there: a tenth is near enough.
     const double low = h.lower[k] + 0.1 * std::abs(h.lower[k]),
                  high = h.upper[k] - 0.1 * std::abs(h.upper[k]);
-    if (t.values[k] <= low || t.values[k] >= high) return true;
-    if (h.dry && std::string_view(parameter.unit) == "rad" && t.values[k] < 3 * data_.rig.angle_step)
+    if (values[k] <= low || values[k] >= high) return true;
+    if (h.dry && std::string_view(parameter.unit) == "rad" && values[k] < 3 * data_.rig.angle_step)
       return true;
   }
   return false;
@@ -97,9 +97,10 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     changed = false;
     for (std::size_t i = 1; i < trials.size(); ++i) {
       const bool twins = trials[i].behind.separation < kTwinLimit;
-      const bool simpler = nests(id_of(trials[0]), id_of(trials[i])) &&
-                           (trials[i].behind.t < kNestedLimit || twins ||
-                            (trials[i].behind.t < kLimitReach && is_limit_case(trials[0])));
+      const bool simpler =
+          nests(id_of(trials[0]), id_of(trials[i])) &&
+          (trials[i].behind.t < kNestedLimit || twins ||
+           (trials[i].behind.t < kLimitReach && is_limit_case(trials[0].hypothesis, trials[0].values)));
       const int more = parameters_of(trials[i]) - parameters_of(trials[0]);
       const bool likelier =
           twins &&
@@ -118,7 +119,7 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     if (&t != &trials.front() && t.in_set)
       for (const Trial& simple : trials)
         if (simple.in_set && nests(id_of(t), id_of(simple)) && !are_two_causes_of_one(t, simple) &&
-            (t.behind.t > -kNestedDoubt || is_limit_case(t)))
+            (t.behind.t > -kNestedDoubt || is_limit_case(t.hypothesis, t.values)))
           t.in_set = false;
   weigh(trials);
 }

@@ -44,7 +44,7 @@ class Ranking {
   [[nodiscard]] std::string id_of(const Trial& trial) const;
   /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none, and a
   /// friction that is hardly larger at rest is dry friction.
-  [[nodiscard]] bool is_limit_case(const Trial& trial) const;
+  [[nodiscard]] bool is_limit_case(int hypothesis, const Values& values) const;
   /// Are there two sensors of one kind, and is what they err by the same?
   [[nodiscard]] bool err_alike(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;

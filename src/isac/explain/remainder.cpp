@@ -127,15 +127,17 @@ void Search::look_at_limits() {
   const std::size_t before = found_.doubts.size();
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const Trial& named = found_.steps[i].trials.front();
-    const std::string id = ranking_.id_of(named);
-    if (ranking_.is_limit_case(named))
+    const char* term = library_.hypotheses[static_cast<std::size_t>(named.hypothesis)].info().term;
+    // As polished: a shape may have gone on to its end.
+    const Values& values = found_.model.model.effects[found_.model.tolerances + i].values;
+    if (ranking_.is_limit_case(named.hypothesis, values))
       found_.doubts.push_back(
           fmt::format("The shape of {} is at the end of its range, where it is hardly told from something "
                       "simpler: it may be that.",
-                      id));
+                      term));
     else if (ranking_.err_alike(named))
       found_.doubts.push_back(
-          fmt::format("By {} both sensors err by the same: one cause of both is likelier than two.", id));
+          fmt::format("By {} both sensors err by the same: one cause of both is likelier than two.", term));
   }
   for (std::size_t i = 0; i < found_.added.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) {

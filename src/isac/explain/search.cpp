@@ -43,9 +43,9 @@ Found Search::run() {
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
   if (found_.adequate && !found_.added.empty()) hold_against_itself();
   look_at_remainder();
-  look_at_limits();
   if (found_.adequate) leave_half_a_step();
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
+  look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
   return std::move(found_);
 }
