@@ -120,11 +120,13 @@ std::string by_noise(const char* headline, const Group& group, const std::vector
 }
 
 std::string pairs(const Group& pair) {
-  return by_noise("Two effects hidden", pair,
-                  {{"both named", [](const Scored& s) { return s.j.all_named; }},
-                   {"just one named", [](const Scored& s) { return s.j.one_named; }},
-                   {"both in the set", [](const Scored& s) { return s.j.in_set; }},
-                   {"one name, wrong, not flagged", [](const Scored& s) { return s.j.single_wrong; }}});
+  return by_noise(
+      "Two effects hidden", pair,
+      {{"both named", [](const Scored& s) { return s.j.all_named; }},
+       {"both named; of a tie, set of both with the rival", [](const Scored& s) { return s.j.both_told; }},
+       {"just one named", [](const Scored& s) { return s.j.one_named; }},
+       {"both in the set", [](const Scored& s) { return s.j.in_set; }},
+       {"one name, wrong, not flagged", [](const Scored& s) { return s.j.single_wrong; }}});
 }
 
 std::string outside(const Group& unknown) {

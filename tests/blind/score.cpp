@@ -200,6 +200,7 @@ Judgement judge_case(const Case& one) {
     j.all_named = holds(a.effects, t.ids[0]) && holds(a.effects, t.ids[1]);
     j.one_named = holds(a.effects, t.ids[0]) != holds(a.effects, t.ids[1]);
     j.in_set = holds(set, t.ids[0]) && holds(set, t.ids[1]);
+    j.both_told = t.nearest_equal.empty() ? j.all_named : j.in_set && holds(set, t.nearest_equal);
   }
   if (t.kind == "unknown") {
     const bool all = std::all_of(t.depends_on.begin(), t.depends_on.end(),

@@ -57,6 +57,7 @@ struct Judgement {
   bool first = false, first_three = false, in_set = false;
   bool single_wrong = false;  ///< one name, wrong, and nothing says that it might be
   bool all_named = false;     ///< of two hidden effects both
+  bool both_told = false;     ///< the same; where a rival is below three sigma, a set of both and the rival
   bool one_named = false;     ///< of two hidden effects just one
   bool asserted = false;      ///< named, and nothing beside it says that it might be another
   bool tied =

@@ -94,6 +94,14 @@ TEST(Score, wants_both_of_two_effects) {
   EXPECT_FALSE(judge_case(one).all_named);
   EXPECT_TRUE(judge_case(one).one_named);
   EXPECT_TRUE(judge_case(one).in_set);
+  EXPECT_FALSE(judge_case(one).both_told);
+  // Where nobody can tell one of them from a rival, the set is right, and names alone are not.
+  one.truth.nearest_equal = "thermal_drift";
+  EXPECT_FALSE(judge_case(one).both_told) << "the rival is not in it";
+  one.answer = named({"leak", "thermal_drift"}, {"creep"});
+  EXPECT_TRUE(judge_case(one).both_told);
+  one.answer = named({"leak", "creep"});
+  EXPECT_FALSE(judge_case(one).both_told);
 }
 
 TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
