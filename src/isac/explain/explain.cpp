@@ -21,6 +21,7 @@
 #include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
+#include "isac/explain/slip_moment.hpp"
 #include "isac/explain/uncertainty.hpp"
 #include "isac/explain/unknown.hpp"
 #include "isac/explain/where.hpp"
@@ -213,6 +214,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                           &chain);
   const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
+  const std::string moment = settle_slip(predictor, library, proof, found);
   const ModelPoint plain = plain_baseline(predictor, found);
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
@@ -245,6 +247,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
            std::any_of(e.rejected.begin(), e.rejected.end(), is);
   });
   describe(predictor, library, found, proof, options, numbers, e);
+  if (!moment.empty() && e.verdict != Verdict::kUnknown) e.summary += " " + moment;
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
   look_at_slow_noise(data, found, options.material, e);

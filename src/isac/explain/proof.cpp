@@ -156,6 +156,17 @@ ModelPoint Proof::moved_here(const ModelPoint& model) const {
   return here;
 }
 
+std::vector<Proof::Span> Proof::spans() const {
+  std::vector<Span> spans;
+  if (!data_) return spans;
+  for (std::size_t r = 0; r + 1 < data_->run_begin.size(); ++r) {
+    const PreparedRun& run = data_->runs[r];
+    if (data_->run_begin[r] < data_->run_begin[r + 1])
+      spans.push_back({run.day_offset, run.day_offset + run.time.back()});
+  }
+  return spans;
+}
+
 Sums Proof::residual(const ModelPoint& model, Chain chain) const {
   return predictor_ ? raw_residual(*predictor_, moved_here(model), chain) : Sums{};
 }

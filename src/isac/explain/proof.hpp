@@ -44,6 +44,11 @@ class Proof {
   /// Held-out runs prepared with the rig and baseline of the fitted ones; empty if none can be used.
   Proof(const HeldOut& heldout, const Prepared& fitted, const QuietPressure& quiet = {});
   [[nodiscard]] std::size_t runs() const noexcept { return count_; }
+  /// s of the day, of each run that can be compared.
+  struct Span {
+    double begin = 0, end = 0;
+  };
+  [[nodiscard]] std::vector<Span> spans() const;
   [[nodiscard]] Sums residual(const ModelPoint& model, Chain chain) const;
   /// Two models in rows freed of what the noise remembers (weights.hpp).
   struct Freed {

@@ -116,6 +116,9 @@ class Search {
   std::vector<Screened> shortlist(const Screen& s) const;
   /// The moment of a slip is not refined: those whose linear response does nearly as well are tried as well.
   static void add_other_moments(const Screened& best, const Screen& s, std::vector<Screened>& list);
+  /// Linear responses let runs at rest stand where they will; within a step of the encoder, as a joint refit has them, they may tell when it
+  /// slipped.
+  void choose_moment(Step& step) const;
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const;
   /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
   bool is_open_at_least(const Step& step, double size) const;

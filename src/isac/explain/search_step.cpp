@@ -18,8 +18,10 @@ constexpr std::size_t kColours = 6;       // effects beside which the noise's co
 constexpr double kWorthRefitting = 0.25;  // of the best linear gain: a candidate below it is not refitted…
 constexpr double kWorthRefittingUnits = 12;  // …unless it still is this many units of noise
 constexpr double kMinimumBlocks = 24;
-constexpr double kWorthALook = 0.5;   // of what is material: a refit may be larger than the linear response
-constexpr double kKeptPromise = 0.1;  // of the linear gain
+constexpr double kWorthALook = 0.5;    // of what is material: a refit may be larger than the linear response
+constexpr double kKeptPromise = 0.1;   // of the linear gain
+constexpr double kNearlyAsWell = 0.6;  // of the gain: another moment of a slip
+constexpr std::size_t kMoment = 1;     // of a slip's values: s, t_s
 
 }  // namespace
 
@@ -153,11 +155,32 @@ std::vector<Screened> Search::shortlist(const Screen& s) const {
 }
 
 void Search::add_other_moments(const Screened& best, const Screen& s, std::vector<Screened>& list) {
-  constexpr double kNearlyAsWell = 0.6;  // of the gain
   for (const Screened& other : s.shapes)
     if (other.hypothesis == best.hypothesis && other.shape != best.shape &&
         other.gain > kNearlyAsWell * best.gain)
       list.push_back(other);
+}
+
+void Search::choose_moment(Step& step) const {
+  const auto is_slip = [&](const Trial& t) {
+    return t.in_set && ranking_.id_of(t) == "encoder_slip" && active_of(t).hypothesis->clock == Clock::kDay;
+  };
+  const auto slip = std::find_if(step.trials.begin(), step.trials.end(), is_slip);
+  if (slip == step.trials.end()) return;
+  const int parameters = ranking_.parameters_of(*slip);
+  Trial other = *slip;
+  double most = 0, least = std::numeric_limits<double>::infinity();
+  for (const Screened& s : step.screen.shapes)
+    if (s.hypothesis == slip->hypothesis) most = std::max(most, s.gain);
+  for (const Screened& s : step.screen.shapes) {
+    if (s.hypothesis != slip->hypothesis || s.gain < kNearlyAsWell * most) continue;
+    other.values[kMoment] = active_of(*slip).hypothesis->shapes[static_cast<std::size_t>(s.shape)][kMoment];
+    if (ranking_.parameters_of(other) > parameters) continue;  // within a run, where it was told between two
+    const Fit fit = refit(predictor_, found_.model, {active_of(other)}, found_.weights, 6);
+    if (fit.loss >= least) continue;
+    least = fit.loss;
+    slip->values = fit.model.effects.back().values;
+  }
 }
 
 std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
@@ -206,6 +229,7 @@ Step Search::refitted(Step step) {
   });
   if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
   ranking_.rank(step.trials, place_.residual);
+  choose_moment(step);
   if (found_.added.empty()) put_material_first(step);
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
   const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;

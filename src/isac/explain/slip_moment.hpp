@@ -1,0 +1,25 @@
+/// @file
+/// The moment at which an encoder slipped, where the fitted runs leave it open and held-out runs lie between.
+///
+/// Between two fitted runs every moment is the same to them, and a run at rest stands anywhere within a step of the encoder: before and after it
+/// are alike as well. A held-out run that lies there was recorded before the slip or after it, and no fit can say which. Every such moment at
+/// which the fitted rows fit as well (t < 1.645, everything refitted) is asked; the held-out rows decide where one leads by t > 1.645.
+///
+/// One of a few moments is all that is taken from the held-out runs: the size of the slip, and everything else, stays as fitted.
+/// t: compare.hpp's. Units: s of the day. Threads: pure. Errors: none; without such runs nothing changes.
+/// Source: docs/derivations/explain.md, "The moment of a slip".
+#pragma once
+
+#include <string>
+
+#include "isac/explain/proof.hpp"
+#include "isac/explain/search.hpp"
+
+namespace isac::explain {
+
+/// Moves the slip in `found.model`, if one was named. What to tell of it, in sentences: where the held-out runs chose, and where no run tells the
+/// moment; else empty.
+[[nodiscard]] std::string settle_slip(const Predictor& predictor, const Library& library, const Proof& proof,
+                                      Found& found);
+
+}  // namespace isac::explain
