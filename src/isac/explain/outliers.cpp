@@ -16,6 +16,7 @@ constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors,
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
 constexpr double kManyOrHigh = 0.25;      // of the white noise: what spikes hold for sure
 constexpr std::size_t kManyForSure = 25;  // where a thousandth of one is expected
+constexpr double kOfThoseThere = 0.04;    // of so many: what the tail may hold of them
 constexpr double kAlike = 0.5;            // of the height: how far the neighbours may be apart, or off theirs
 
 double difference(const std::vector<double>& x, std::size_t k) {
@@ -77,6 +78,12 @@ Outliers find_outliers(std::span<const Series> runs, double quantum) {
       std::clamp(std::log(std::log(50.0) / std::log(10.0)) / std::log(q98 / q90), 0.5, kMostBent);
   const double tail = q98 * std::pow(std::log(static_cast<double>(size.size()) / kAlpha) / std::log(50.0),
                                      1 / (kLessBent * k));
+  // Many beyond where the tail holds hardly any need not each be beyond its end.
+  const double least = std::max(kLeastOut * white, 3 * quantum);
+  const double expected =
+      static_cast<double>(size.size()) * std::pow(0.02, std::pow(least / q98, kLessBent * k));
+  const Outliers many = count_outliers(runs, least);
+  if (many.count >= kManyForSure && expected <= kOfThoseThere * static_cast<double>(many.count)) return many;
   const Outliers lone = count_outliers(runs, std::max({tail, kLeastOut * white, 3 * quantum}));
   if (lone.rms >= kManyOrHigh * white || lone.count >= kManyForSure) return lone;
   // A few that are hardly beyond it may be a tail that bends the other way: then an exponential's end is asked for.

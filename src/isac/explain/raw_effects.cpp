@@ -158,7 +158,7 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
     effect.candidate.evidence.push_back(
         {true,
          fmt::format("{} single samples of {} stand {} N m or more beside both neighbours, {} N m in the "
-                     "middle; noise with the residual's own tails would leave none.",
+                     "middle; noise with the residual's own tails leaves hardly any.",
                      spikes.count, spikes.samples, rounded(spikes.limit), rounded(spikes.height))});
     const double limit = spikes.limit;
     effect.taken = [limit](const std::vector<Series>& runs) { return taken_by_limit(limit, runs); };
