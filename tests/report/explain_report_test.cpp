@@ -48,6 +48,15 @@ TEST(ExplainReport, says_that_nothing_is_missing_and_what_could_still_hide) {
     EXPECT_EQ(html.find(absent), std::string::npos) << absent;
 }
 
+TEST(ExplainReport, calls_what_is_left_noise_where_nothing_is_missing) {
+  Explanation e = none_sample();
+  e.gap.noise_floor = 0.4 * e.gap.heldout_before;
+  EXPECT_NE(gap_sentence(e).find("the rest is noise that remembers"), std::string::npos) << gap_sentence(e);
+  EXPECT_EQ(gap_sentence(e).find("the noise floor is"), std::string::npos) << gap_sentence(e);
+  e.gap.noise_floor = 0.9 * e.gap.heldout_before;
+  EXPECT_NE(gap_sentence(e).find("the noise floor is"), std::string::npos) << gap_sentence(e);
+}
+
 TEST(ExplainReport, says_that_something_is_too_small_to_matter) {
   const std::string html = page_of(immaterial_sample(), "immaterial");
   expect_parts(html, {"too small against the noise floor to matter", "Immaterial", "p &lt; 0.001"});

@@ -23,7 +23,9 @@ constexpr double kMainsLow = 45, kMainsHigh = 65;  // Hz, as the catalogue has i
 constexpr std::size_t kFewestSpikes = 5;
 constexpr double kBesideNamed = 0.35;  // of the gap that the named effects closed
 constexpr double kBesideUnknown =
-    2;                        // sizes of what is left unnamed: a line that is larger is what is missing
+    2;  // sizes of what is left unnamed: a line that is larger is what is missing
+constexpr double kHunting =
+    0.04;  // of the residual's power: a real regulator's noise has a line of 0.02, a valve that hunts 0.3
 constexpr double kLooks = 3;  // lines of torque, of motion, and spikes share the significance
 
 /// Mean square that something takes out of a residual; negative where it adds.
@@ -167,9 +169,34 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
   return all;
 }
 
+/// The gap of one chain as the model leaves it; `floor` in the chain's unit.
+Gap open_gap(const Predictor& predictor, const ModelPoint& model, const Proof& proof, Chain chain,
+             double floor) {
+  const Label label = label_of(predictor.data(), chain);
+  const Sums heldout = proof.residual(model, chain);
+  Gap gap;
+  gap.signal = label.signal;
+  gap.unit = label.unit;
+  gap.noise_floor = label.scale * floor;
+  gap.before = gap.after = label.scale * raw_residual(predictor, model, chain).rms();
+  gap.heldout_before = gap.heldout_after = label.scale * heldout.rms();
+  gap.heldout_zero_model = label.scale * heldout.signal_rms();
+  return gap;
+}
+
+bool torque_shows(const Predictor& predictor, const ModelPoint& model, double frequency,
+                  const ExplainOptions& options) {
+  constexpr double kSame = 0.02;  // of the frequency
+  const std::vector<SpectralLine> lines =
+      spectral_lines(residual_series(predictor, model, Chain::kTorque), options.significance / kLooks);
+  return std::any_of(lines.begin(), lines.end(), [&](const SpectralLine& line) {
+    return std::abs(line.frequency - frequency) < kSame * frequency;
+  });
+}
+
 /// A line that stands in the pressures and not in what was asked of them: a valve that hunts. The catalogue has no name for it, and what the
 /// torque shows of it is no disturbance from outside.
-bool valve_hunts(const Predictor& predictor, const ModelPoint& model, const Found& found,
+bool valve_hunts(const Predictor& predictor, const ModelPoint& model, const Found& found, const Proof& proof,
                  const ExplainOptions& options, Explanation& e) {
   const Prepared& data = predictor.data();
   SpectralLine strongest;
@@ -184,7 +211,10 @@ bool valve_hunts(const Predictor& predictor, const ModelPoint& model, const Foun
   }
   const double floor = found.floors.white[static_cast<int>(chain)];
   if (!(strongest.rms >= options.material * floor)) return false;
+  if (strongest.share < kHunting && !torque_shows(predictor, model, strongest.frequency, options))
+    return false;
   const Label label = label_of(data, chain);
+  if (e.gap.signal != label.signal) e.gap = open_gap(predictor, model, proof, chain, found.floors.all(chain));
   e.verdict = Verdict::kUnknown;
   e.detected = true;
   e.p_value = std::min(e.p_value, strongest.p_value);
@@ -247,7 +277,7 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
                      const ExplainOptions& options, Explanation& e) {
   const ModelPoint& model = e.effects.empty() ? found.baseline.model : found.model.model;
   const bool unnamed = e.verdict == Verdict::kUnknown, in_valves = e.unknown && e.unknown->subsystem == "pcu";
-  if (e.effects.empty() && (!unnamed || in_valves) && valve_hunts(predictor, model, found, options, e))
+  if (e.effects.empty() && (!unnamed || in_valves) && valve_hunts(predictor, model, found, proof, options, e))
     return;
   if (unnamed && (in_valves || found.steps.empty())) return;
   std::vector<RawEffect> effects = look(predictor, model, options);
@@ -289,16 +319,8 @@ void add_raw_effects(const Predictor& predictor, const Found& found, const Proof
       leave_without_name(effect, label, e);
       return;
     }
-    if (e.effects.empty() && e.gap.signal != label.signal) {
-      e.gap = {};
-      e.gap.signal = label.signal;
-      e.gap.unit = label.unit;
-      e.gap.noise_floor = told;
-      e.gap.before = e.gap.after = raw_residual(predictor, model, effect.chain).rms();
-      const Sums sums = proof.residual(model, effect.chain);
-      e.gap.heldout_before = e.gap.heldout_after = sums.rms();
-      e.gap.heldout_zero_model = sums.signal_rms();
-    }
+    if (e.effects.empty() && e.gap.signal != label.signal)
+      e.gap = open_gap(predictor, model, proof, effect.chain, told);
     if (e.gap.signal == label.signal) {
       e.gap.after = less(e.gap.after, fitted);
       e.gap.heldout_after = less(e.gap.heldout_after, held);

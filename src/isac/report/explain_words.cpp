@@ -97,7 +97,13 @@ std::string gap_sentence(const Explanation& e) {
   text += signal_in_words(gap.signal) + " is " + with_unit(before, gap.unit) + " rms off";
   if (std::isfinite(after) && !e.effects.empty())
     text += " before and " + with_unit(after, gap.unit) + " after";
-  if (std::isfinite(gap.noise_floor)) text += "; the noise floor is " + with_unit(gap.noise_floor, gap.unit);
+  constexpr double kRemembers = 1.25;  // of the floor: nothing is missing, and yet so much more is left
+  const bool nothing = e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial;
+  if (nothing && before > kRemembers * gap.noise_floor)
+    text += "; from sample to sample noise makes " + with_unit(gap.noise_floor, gap.unit) +
+            " of it, and the rest is noise that remembers";
+  else if (std::isfinite(gap.noise_floor))
+    text += "; the noise floor is " + with_unit(gap.noise_floor, gap.unit);
   if (std::isfinite(gap.freed_before))
     text += "; the noise's slow part decides which is larger: freed of it, " +
             with_unit(gap.freed_before, gap.unit) + " before and " + with_unit(gap.freed_after, gap.unit) +
