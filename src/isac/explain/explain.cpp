@@ -175,6 +175,10 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const Library& library = *library_here;
   const Predictor& predictor = *predictor_here;
 
+  const Proof proof(heldout, data, quiet);
+  std::string moment = slip_instead(predictor, library, proof, found);
+  if (moment.empty()) moment = settle_slip(predictor, library, proof, found);
+
   Explanation e;
   e.samples = data.rows.size();
   e.blocks = data.blocks;
@@ -212,9 +216,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (!found.added.empty())
     (void)size_over_floor(data, found.weights, found.floors, found.model.residual - found.baseline.residual,
                           &chain);
-  const Proof proof(heldout, data, quiet);
   e.heldout_runs = proof.runs();
-  const std::string moment = settle_slip(predictor, library, proof, found);
   const ModelPoint plain = plain_baseline(predictor, found);
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);

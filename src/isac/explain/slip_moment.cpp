@@ -15,16 +15,23 @@ namespace {
 constexpr double kBefore = 0.5;  // s before a run begins
 constexpr double kPause = 60;    // s: nobody asks for less, between two runs
 constexpr int kIterations = 8;
+constexpr double kClearly = 3;      // sigma, of held-out rows, for another name than the fitted ones had
 constexpr std::size_t kMoment = 1;  // of the values of a slip: s, t_s
+
+bool is_slip(const Hypothesis& h) {
+  return h.id() == "encoder_slip" && h.clock == Clock::kDay;
+}
+
+/// Where both are the same there is no t.
+bool leaves_open(const Comparison& c) {
+  return !(c.t > kSetLimit) || c.separation < kTwinLimit;
+}
 
 /// Where among the effects of the model a slip stands that happens once in a day; none: their number.
 std::size_t slip_of(const Found& found) {
   const std::vector<Active>& effects = found.model.model.effects;
-  const auto slip =
-      std::find_if(effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances), effects.end(),
-                   [](const Active& a) {
-                     return a.hypothesis->id() == "encoder_slip" && a.hypothesis->clock == Clock::kDay;
-                   });
+  const auto slip = std::find_if(effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances),
+                                 effects.end(), [](const Active& a) { return is_slip(*a.hypothesis); });
   return static_cast<std::size_t>(slip - effects.begin());
 }
 
@@ -89,15 +96,18 @@ std::string settle_slip(const Predictor& predictor, const Library& library, cons
   const auto moment_of = [&](const Fit& fit) { return fit.model.effects[slip].values[kMoment]; };
   const double was = moment_of(found.model);
   std::vector<Fit> open = as_good_at_other_moments(predictor, library, found, slip, heldout);
-  const auto ahead = [&](const Fit& a, const Fit& b) {
-    return proof.freed(a.model, b.model, found.weights, Chain::kTorque).behind.t;
+  const auto behind = [&](const Fit& a, const Fit& b) {  // b, in rows that nothing was fitted to
+    return proof.freed(a.model, b.model, found.weights, Chain::kTorque).behind;
   };
   for (const Fit& fit : open)
-    if (ahead(fit, found.model) > kSetLimit) found.model = fit;
+    if (!leaves_open(behind(fit, found.model))) found.model = fit;
   const double at = moment_of(found.model);
+  for (std::size_t k = 0; k < found.added.size(); ++k)
+    if (is_slip(library.hypotheses[static_cast<std::size_t>(found.added[k])]))
+      found.steps[k].trials.front().values[kMoment] = at;
   double first = at, last = at;
   for (const Fit& fit : open)
-    if (ahead(found.model, fit) <= kSetLimit) {
+    if (leaves_open(behind(found.model, fit))) {
       first = std::min(first, moment_of(fit));
       last = std::max(last, moment_of(fit));
     }
@@ -120,6 +130,48 @@ std::string settle_slip(const Predictor& predictor, const Library& library, cons
     told += fmt::format("{}Between {:.0f} s and {:.0f} s no run tells when it slipped.",
                         told.empty() ? "" : " ", first, last);
   return told;
+}
+
+std::string slip_instead(const Predictor& predictor, const Library& library, const Proof& proof,
+                         Found& found) {
+  if (found.added.size() != 1 || proof.runs() == 0) return "";
+  const std::vector<Trial>& trials = found.steps.front().trials;
+  const auto slip = std::find_if(trials.begin() + 1, trials.end(), [&](const Trial& t) {
+    return is_slip(library.hypotheses[static_cast<std::size_t>(t.hypothesis)]) && cannot_rule_out(t.behind);
+  });
+  if (slip == trials.end()) return "";
+  const auto refitted = [&](const Trial& t) {
+    const Active active{&library.hypotheses[static_cast<std::size_t>(t.hypothesis)], t.values};
+    return refit(predictor, found.baseline, {active}, found.weights, kIterations);
+  };
+  Found other = found;
+  other.model = refitted(*slip);
+  other.added.front() = slip->hypothesis;
+  std::vector<Trial>& order = other.steps.front().trials;
+  std::rotate(order.begin(), order.begin() + (slip - trials.begin()),
+              order.begin() + (slip - trials.begin()) + 1);
+  const std::string moment = settle_slip(predictor, library, proof, other);
+  const auto behind = [&](const ModelPoint& model) {
+    return proof.freed(other.model.model, model, found.weights, Chain::kTorque).behind;
+  };
+  const Comparison first = behind(found.model.model);
+  if (first.t < kClearly) return "";
+  const std::string instead = library.hypotheses[static_cast<std::size_t>(found.added.front())].info().term;
+  for (Trial& t : order) {
+    if (&t == &order.front()) {
+      t.behind = {};
+      t.in_set = true;
+    } else if (cannot_rule_out(t.behind)) {
+      t.behind = behind(refitted(t).model);
+      t.in_set = cannot_rule_out(t.behind);
+    }
+  }
+  Ranking::weigh(order);
+  other.model = polished(predictor, std::move(other.model), other.weights);
+  found = std::move(other);
+  std::string told = fmt::format(
+      "The fitted runs cannot tell it from {}; the held-out runs did, by {:.0f} sigma.", instead, first.t);
+  return moment.empty() ? told : told + " " + moment;
 }
 
 }  // namespace isac::explain
