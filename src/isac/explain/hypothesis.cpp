@@ -383,40 +383,6 @@ void tolerate(Library& library, const Prepared& data, const std::string& id, dou
   library.tolerances.push_back(std::move(h));
 }
 
-void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual) {
-  struct Point {
-    double time = 0, value = 0;
-    bool inside = false;
-  };
-  constexpr double kFromEnds = 1.0;  // s
-  std::vector<Point> points;
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    if (data.rows[i].chain != Chain::kTorque) continue;
-    const PreparedRun& run = data.runs[data.rows[i].run];
-    const double t = run.time[data.rows[i].sample];
-    points.push_back({run.day_offset + t, residual[static_cast<Eigen::Index>(i)],
-                      t > kFromEnds && t < run.time.back() - kFromEnds});
-  }
-  if (points.size() < 100) return;
-  std::stable_sort(points.begin(), points.end(),
-                   [](const Point& a, const Point& b) { return a.time < b.time; });
-  double mean = 0;
-  for (const Point& p : points) mean += p.value / static_cast<double>(points.size());
-  const auto n = static_cast<double>(points.size());
-  double sum = 0, best = 0, at = 0;
-  for (std::size_t k = 0; k + 1 < points.size(); ++k) {
-    sum += points[k].value - mean;
-    const double before = static_cast<double>(k + 1), gain = sum * sum * n / (before * (n - before));
-    if (!points[k].inside || gain <= best) continue;
-    best = gain;
-    at = 0.5 * (points[k].time + points[k + 1].time);
-  }
-  if (best <= 0) return;
-  for (Hypothesis& h : library.hypotheses)
-    if (string_view(h.info().id) == "encoder_slip" && h.clock == Clock::kDay)
-      h.shapes.push_back({h.info().parameters[0].typical, at});
-}
-
 const char* family_of(int effect) noexcept {
   const auto catalogue = models::effect_catalogue();
   if (effect < 0 || effect >= static_cast<int>(catalogue.size())) return "";

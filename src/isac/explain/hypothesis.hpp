@@ -10,7 +10,6 @@
 /// Units: SI. Threads: values. Errors: none. Source: docs/effects.md, docs/derivations/explain.md.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <vector>
@@ -76,9 +75,6 @@ struct Library {
 
 /// Makes an effect a tolerance within bounds, or gives one that is there other bounds.
 void tolerate(Library& library, const Prepared& data, const std::string& id, double low, double high);
-
-/// Adds to the encoder's slip the moment within a run at which the torque's residual jumps most and stays.
-void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& residual);
 
 /// Rate-independent dissipation, viscous, elastic …: what a tied verdict falls back to.
 [[nodiscard]] const char* family_of(int effect) noexcept;

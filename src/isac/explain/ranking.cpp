@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "isac/explain/generic_fit.hpp"
+#include "isac/explain/slip_moment.hpp"
 
 namespace isac::explain {
 namespace {
@@ -23,11 +24,11 @@ constexpr double kLimitReach =
 int Ranking::parameters_of(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
   // Between two runs there is one moment, within a run the best of many.
-  const bool within = h.id() == "encoder_slip" && h.clock == Clock::kDay &&
-                      std::any_of(data_.runs.begin(), data_.runs.end(), [&](const PreparedRun& run) {
-                        return !run.time.empty() && t.values[1] > run.day_offset &&
-                               t.values[1] < run.day_offset + run.time.back();
-                      });
+  const bool within =
+      is_slip(h) && std::any_of(data_.runs.begin(), data_.runs.end(), [&](const PreparedRun& run) {
+        return !run.time.empty() && t.values[1] > run.day_offset &&
+               t.values[1] < run.day_offset + run.time.back();
+      });
   return h.parameters() + (within ? kChoosingOne : 0);
 }
 std::string Ranking::id_of(const Trial& t) const {

@@ -9,6 +9,7 @@
 #include "isac/explain/gate.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/slip_moment.hpp"
 
 namespace isac::explain {
 namespace {

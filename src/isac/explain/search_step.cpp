@@ -8,6 +8,7 @@
 
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/slip_moment.hpp"
 #include "isac/explain/workers.hpp"
 
 namespace isac::explain {
@@ -162,10 +163,9 @@ void Search::add_other_moments(const Screened& best, const Screen& s, std::vecto
 }
 
 void Search::choose_moment(Step& step) const {
-  const auto is_slip = [&](const Trial& t) {
-    return t.in_set && ranking_.id_of(t) == "encoder_slip" && active_of(t).hypothesis->clock == Clock::kDay;
-  };
-  const auto slip = std::find_if(step.trials.begin(), step.trials.end(), is_slip);
+  const auto slip = std::find_if(step.trials.begin(), step.trials.end(), [&](const Trial& t) {
+    return t.in_set && is_slip(*active_of(t).hypothesis);
+  });
   if (slip == step.trials.end()) return;
   const int parameters = ranking_.parameters_of(*slip);
   Trial other = *slip;
