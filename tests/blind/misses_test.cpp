@@ -69,6 +69,8 @@ INSTANTIATE_TEST_SUITE_P(
              "nothing, for its few blocks were held against the loudest of a hundred functions"},
         Miss{"faint", "coloured", "hysteresis", "5101", R"("effects":[{"id":"hysteresis")",
              "unknown, for the noise of held-out runs decided against it"},
+        Miss{"clear", "coloured", "force_drift", "6201", R"("effects":[{"id":"force_drift")",
+             "unknown, for both drifts ran off together, and noise of the motion decided"},
         Miss{"faint", "white", "encoder_slip", "6101", R"("effects":[{"id":"encoder_slip")",
              "unknown, for a run at rest let it slip a run too early"},
         Miss{"clear", "white", "encoder_slip", "6201", R"("effects":[{"id":"encoder_slip")",

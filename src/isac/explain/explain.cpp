@@ -124,6 +124,29 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
+/// An effect of the forces enters the torque and, where the joint is free, its motion. Where slow noise decides against it in one of them, and by
+/// little, the other may show it: then the gap is told there.
+bool other_reading_shows(const Predictor& predictor, const Library& library, const Found& found,
+                         const ModelPoint& plain, const Proof& proof, Chain chain,
+                         const ExplainOptions& options, Gap& gap) {
+  constexpr double kByLittle = 1.05;
+  if (chain != Chain::kTorque && chain != Chain::kMotion) return false;
+  const Chain other = chain == Chain::kTorque ? Chain::kMotion : Chain::kTorque;
+  const Colour& colour = found.weights.colour[static_cast<int>(chain)];
+  const bool enters = std::all_of(found.added.begin(), found.added.end(), [&](int h) {
+    return (library.hypotheses[static_cast<std::size_t>(h)].chains & bit(other)) != 0;
+  });
+  if (!enters || !predictor.data().has(other) || !(colour.slow > 0 || colour.wander > 0) ||
+      gap.heldout_after > kByLittle * gap.heldout_before ||
+      proof.freed(found.model.model, plain, found.weights, other).behind.t < kSetLimit)
+    return false;
+  Gap there;
+  fill_gap(predictor, found, plain, proof, other, options.baseline, there);
+  if (!(there.heldout_after < there.heldout_before) || closes_little(there)) return false;
+  gap = there;
+  return true;
+}
+
 /// None of the catalogue: what came nearest is told as ruled out, nothing is added.
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
@@ -220,7 +243,9 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const ModelPoint plain = plain_baseline(predictor, found);
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
-  if (is_refuted(predictor, found, user, proof, chain, options, e.gap)) e.verdict = Verdict::kUnknown;
+  if (is_refuted(predictor, found, user, proof, chain, options, e.gap) &&
+      !other_reading_shows(predictor, library, found, plain, proof, chain, options, e.gap))
+    e.verdict = Verdict::kUnknown;
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);
