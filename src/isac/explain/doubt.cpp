@@ -95,6 +95,34 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
          !is_mended_by_raw_effects(predictor, found, proof, chain, options, gap);
 }
 
+void take_away_what_is_refuted(const Predictor& predictor, const Library& library, const Proof& proof,
+                               Found& found) {
+  constexpr double kWorse = 1.02;
+  constexpr int kIterations = 8;
+  if (proof.runs() == 0) return;
+  for (std::size_t k = found.added.size(); k-- > 0 && found.added.size() > 1;) {
+    std::vector<Active> others;
+    for (std::size_t i = 0; i < found.added.size(); ++i)
+      if (i != k) others.push_back(found.model.model.effects[found.model.tolerances + i]);
+    Fit without = refit(predictor, found.baseline, others, found.weights, kIterations);
+    Chain chain = Chain::kTorque;
+    (void)size_over_floor(predictor.data(), found.weights, found.floors,
+                          found.model.residual - without.residual, &chain);
+    const auto rms = [&](const Fit& fit) { return proof.residual(fit.model, chain).rms(); };
+    const double t = proof.freed(found.model.model, without.model, found.weights, chain).behind.t;
+    if (!(rms(found.model) > kWorse * rms(without)) || t >= kSetLimit) continue;
+    found.doubts.push_back(
+        fmt::format("Something more is missing on the fitted runs (p = {:.1g}), most like {}; the held-out "
+                    "runs refute that "
+                    "name.",
+                    found.steps[k].gate.p_value,
+                    library.hypotheses[static_cast<std::size_t>(found.added[k])].info().term));
+    found.model = polished(predictor, std::move(without), found.weights);
+    found.added.erase(found.added.begin() + static_cast<std::ptrdiff_t>(k));
+    found.steps.erase(found.steps.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+}
+
 void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
   for (auto* named : {&e.effects, &e.alternatives})
     for (Candidate& c : *named) c.confidence *= 1 - kNoneOfThem;

@@ -124,10 +124,10 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
-/// An effect of the forces enters the torque and, where the joint is free, its motion. Where slow noise decides against it in one of them, and by
-/// little, the other may show it: then the gap is told there.
+/// An effect of the forces enters the torque and, where the joint is free, its motion. Where slow noise decides in one of them, and by little if it
+/// refutes the name, the other may show it: then the gap is told there.
 bool other_reading_shows(const Predictor& predictor, const Library& library, const Found& found,
-                         const ModelPoint& plain, const Proof& proof, Chain chain,
+                         const ModelPoint& plain, const Proof& proof, Chain chain, bool refuted,
                          const ExplainOptions& options, Gap& gap) {
   constexpr double kByLittle = 1.05;
   if (chain != Chain::kTorque && chain != Chain::kMotion) return false;
@@ -137,12 +137,12 @@ bool other_reading_shows(const Predictor& predictor, const Library& library, con
     return (library.hypotheses[static_cast<std::size_t>(h)].chains & bit(other)) != 0;
   });
   if (!enters || !predictor.data().has(other) || !(colour.slow > 0 || colour.wander > 0) ||
-      gap.heldout_after > kByLittle * gap.heldout_before ||
+      (refuted && gap.heldout_after > kByLittle * gap.heldout_before) ||
       proof.freed(found.model.model, plain, found.weights, other).behind.t < kSetLimit)
     return false;
   Gap there;
   fill_gap(predictor, found, plain, proof, other, options.baseline, there);
-  if (!(there.heldout_after < there.heldout_before) || closes_little(there)) return false;
+  if (!(there.heldout_after < there.heldout_before) || (refuted && closes_little(there))) return false;
   gap = there;
   return true;
 }
@@ -199,6 +199,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const Predictor& predictor = *predictor_here;
 
   const Proof proof(heldout, data, quiet);
+  take_away_what_is_refuted(predictor, library, proof, found);
   std::string moment = slip_instead(predictor, library, proof, found);
   if (moment.empty()) moment = settle_slip(predictor, library, proof, found);
 
@@ -243,9 +244,11 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const ModelPoint plain = plain_baseline(predictor, found);
   const ModelPoint& user = found.added.empty() ? found.baseline.model : plain;
   fill_gap(predictor, found, plain, proof, chain, options.baseline, e.gap);
-  if (is_refuted(predictor, found, user, proof, chain, options, e.gap) &&
-      !other_reading_shows(predictor, library, found, plain, proof, chain, options, e.gap))
-    e.verdict = Verdict::kUnknown;
+  const bool refuted = is_refuted(predictor, found, user, proof, chain, options, e.gap);
+  const bool told =
+      (refuted || e.gap.heldout_after > e.gap.heldout_before) && !found.added.empty() &&
+      other_reading_shows(predictor, library, found, plain, proof, chain, refuted, options, e.gap);
+  if (refuted && !told) e.verdict = Verdict::kUnknown;
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);
