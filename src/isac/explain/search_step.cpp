@@ -22,7 +22,6 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kWorthALook = 0.5;    // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;   // of the linear gain
 constexpr double kNearlyAsWell = 0.6;  // of the gain: another moment of a slip
-constexpr std::size_t kMoment = 1;     // of a slip's values: s, t_s
 
 }  // namespace
 
@@ -174,7 +173,8 @@ void Search::choose_moment(Step& step) const {
     if (s.hypothesis == slip->hypothesis) most = std::max(most, s.gain);
   for (const Screened& s : step.screen.shapes) {
     if (s.hypothesis != slip->hypothesis || s.gain < kNearlyAsWell * most) continue;
-    other.values[kMoment] = active_of(*slip).hypothesis->shapes[static_cast<std::size_t>(s.shape)][kMoment];
+    other.values[kSlipMoment] =
+        active_of(*slip).hypothesis->shapes[static_cast<std::size_t>(s.shape)][kSlipMoment];
     if (ranking_.parameters_of(other) > parameters) continue;  // within a run, where it was told between two
     const Fit fit = refit(predictor_, found_.model, {active_of(other)}, found_.weights, 6);
     if (fit.loss >= least) continue;

@@ -12,11 +12,10 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kBefore = 0.5;  // s before a run begins
-constexpr double kPause = 60;    // s: nobody asks for less, between two runs
-constexpr int kIterations = 8;
-constexpr double kClearly = 3;      // sigma, of held-out rows, for another name than the fitted ones had
-constexpr std::size_t kMoment = 1;  // of the values of a slip: s, t_s
+constexpr double kBeforeARun = 0.5;  // s before a run begins
+constexpr double kLongPause = 60;    // s: nobody asks for less, between two runs
+constexpr int kSlipIterations = 8;
+constexpr double kClearlyASlip = 3;  // sigma, of held-out rows, for another name than the fitted ones had
 
 /// Where both are the same there is no t.
 bool leaves_open(const Comparison& c) {
@@ -35,8 +34,8 @@ Fit with_slip_at(const Predictor& predictor, const Found& found, std::size_t sli
   std::vector<Active> effects(
       found.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances),
       found.model.model.effects.end());
-  effects[slip - found.model.tolerances].values[kMoment] = moment;
-  return refit(predictor, found.baseline, effects, found.weights, kIterations);
+  effects[slip - found.model.tolerances].values[kSlipMoment] = moment;
+  return refit(predictor, found.baseline, effects, found.weights, kSlipIterations);
 }
 
 /// Moments that are one to the fitted runs and not to the held-out ones: each of those in the same pause was recorded before or after.
@@ -52,8 +51,8 @@ std::vector<double> same_to_fitted(const Prepared& data, const std::vector<Proof
   }
   std::vector<double> moments{moment};
   for (const Proof::Span& run : heldout)
-    if (run.begin > low && run.begin < high) moments.push_back(run.begin - kBefore);
-  if (std::isfinite(high)) moments.push_back(high - kBefore);
+    if (run.begin > low && run.begin < high) moments.push_back(run.begin - kBeforeARun);
+  if (std::isfinite(high)) moments.push_back(high - kBeforeARun);
   return moments;
 }
 
@@ -62,11 +61,11 @@ std::vector<Fit> as_good_at_other_moments(const Predictor& predictor, const Libr
                                           const Found& found, std::size_t slip,
                                           const std::vector<Proof::Span>& heldout) {
   const Active& named = found.model.model.effects[slip];
-  const double was = named.values[kMoment];
+  const double was = named.values[kSlipMoment];
   std::set<double> moments{was};
   for (const Hypothesis& h : library.hypotheses)
     if (h.effect == named.hypothesis->effect && h.clock == Clock::kDay)
-      for (const Values& shape : h.shapes) moments.insert(shape[kMoment]);
+      for (const Values& shape : h.shapes) moments.insert(shape[kSlipMoment]);
   const NoiseDensity noise = noise_density(predictor.data(), found.model.residual);
   std::vector<Fit> as_good;
   std::set<double> had{was};
@@ -76,7 +75,7 @@ std::vector<Fit> as_good_at_other_moments(const Predictor& predictor, const Libr
     for (const double same : same_to_fitted(predictor.data(), heldout, moment)) {
       if (!had.insert(same).second) continue;
       as_good.push_back(fit);
-      as_good.back().model.effects[slip].values[kMoment] = same;
+      as_good.back().model.effects[slip].values[kSlipMoment] = same;
     }
   }
   return as_good;
@@ -126,7 +125,7 @@ std::string settle_slip(const Predictor& predictor, const Library& library, cons
   const std::size_t slip = slip_of(found);
   const std::vector<Proof::Span> heldout = proof.spans();
   if (slip == found.model.model.effects.size() || heldout.empty()) return "";
-  const auto moment_of = [&](const Fit& fit) { return fit.model.effects[slip].values[kMoment]; };
+  const auto moment_of = [&](const Fit& fit) { return fit.model.effects[slip].values[kSlipMoment]; };
   const double was = moment_of(found.model);
   std::vector<Fit> open = as_good_at_other_moments(predictor, library, found, slip, heldout);
   const auto behind = [&](const Fit& a, const Fit& b) {  // b, in rows that nothing was fitted to
@@ -137,7 +136,7 @@ std::string settle_slip(const Predictor& predictor, const Library& library, cons
   const double at = moment_of(found.model);
   for (std::size_t k = 0; k < found.added.size(); ++k)
     if (is_slip(library.hypotheses[static_cast<std::size_t>(found.added[k])]))
-      found.steps[k].trials.front().values[kMoment] = at;
+      found.steps[k].trials.front().values[kSlipMoment] = at;
   double first = at, last = at;
   for (const Fit& fit : open)
     if (leaves_open(behind(found.model, fit))) {
@@ -159,7 +158,7 @@ std::string settle_slip(const Predictor& predictor, const Library& library, cons
         "The fitted runs leave open whether it slipped at {:.0f} s or at {:.0f} s; the held-out runs "
         "decided.",
         was, at);
-  if (last - first > kPause)
+  if (last - first > kLongPause)
     told += fmt::format("{}Between {:.0f} s and {:.0f} s no run tells when it slipped.",
                         told.empty() ? "" : " ", first, last);
   return told;
@@ -175,7 +174,7 @@ std::string slip_instead(const Predictor& predictor, const Library& library, con
   if (slip == trials.end()) return "";
   const auto refitted = [&](const Trial& t) {
     const Active active{&library.hypotheses[static_cast<std::size_t>(t.hypothesis)], t.values};
-    return refit(predictor, found.baseline, {active}, found.weights, kIterations);
+    return refit(predictor, found.baseline, {active}, found.weights, kSlipIterations);
   };
   Found other = found;
   other.model = refitted(*slip);
@@ -188,7 +187,7 @@ std::string slip_instead(const Predictor& predictor, const Library& library, con
     return proof.freed(other.model.model, model, found.weights, Chain::kTorque).behind;
   };
   const Comparison first = behind(found.model.model);
-  if (first.t < kClearly) return "";
+  if (first.t < kClearlyASlip) return "";
   const std::string instead = library.hypotheses[static_cast<std::size_t>(found.added.front())].info().term;
   for (Trial& t : order) {
     if (&t == &order.front()) {

@@ -18,6 +18,8 @@
 
 namespace isac::explain {
 
+inline constexpr std::size_t kSlipMoment = 1;  ///< of the values of a slip: s, t_s
+
 /// A slip that happens once in a day. (One that falls on the same moment of every run is another.)
 [[nodiscard]] bool is_slip(const Hypothesis& hypothesis);
 
