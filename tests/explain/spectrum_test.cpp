@@ -81,6 +81,24 @@ TEST(SpectralLines, says_so_where_the_phase_is_another_one_in_every_run) {
     EXPECT_NEAR(std::hypot(phase_in(runs[r], 3.7).sine, phase_in(runs[r], 3.7).cosine), 1, 1e-12);
 }
 
+// What a strong line leaks into the bins beside its own says as much as any: the cap makes them alike.
+TEST(SpectralLines, finds_a_strong_line_where_it_is_and_not_a_bin_beside_it) {
+  std::mt19937 random(6);
+  for (const double frequency : {16.263, 7.518, 31.1}) {
+    std::vector<Series> runs;
+    std::vector<double> phase;
+    for (const std::size_t samples : {20000U, 22500U, 25000U, 20000U, 22500U}) {
+      runs.push_back(noise_runs(random, Noise::kColoured, 1, samples).front());
+      phase.push_back(1.3 * static_cast<double>(samples % 7));
+    }
+    add_line(runs, frequency, 4.0, phase);
+    const std::vector<SpectralLine> lines = spectral_lines(runs, 0.001);
+    ASSERT_FALSE(lines.empty());
+    EXPECT_NEAR(lines.front().frequency, frequency, 0.002);
+    EXPECT_NEAR(lines.front().amplitude, 4.0, 0.08);
+  }
+}
+
 TEST(SpectralLines, leaves_to_the_motion_what_the_motion_makes) {
   std::mt19937 random(5);
   std::vector<Series> runs = noise_runs(random, Noise::kWhite, 3, 8192);

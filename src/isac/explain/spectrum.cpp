@@ -135,6 +135,20 @@ double gain_at(std::span<const Series> runs, const std::vector<std::size_t>& whi
   return sum;
 }
 
+/// What a strong line leaks reaches the cap in bins beside its own, and they are alike: the one of them that explains most.
+double strongest_near(std::span<const Series> runs, const std::vector<std::size_t>& which, double frequency,
+                      double resolution) {
+  constexpr int kBins = 4;
+  double best = frequency, most = gain_at(runs, which, frequency);
+  for (int k = -2 * kBins; k <= 2 * kBins; ++k) {
+    const double near = frequency + 0.5 * k * resolution, gain = near > 0 ? gain_at(runs, which, near) : 0.0;
+    if (gain <= most) continue;
+    most = gain;
+    best = near;
+  }
+  return best;
+}
+
 /// Golden section for the frequency that explains most, within one bin.
 double refined(std::span<const Series> runs, const std::vector<std::size_t>& which, double frequency,
                double reach) {
@@ -283,7 +297,8 @@ std::vector<SpectralLine> spectral_lines(std::span<const Series> runs, double si
     SpectralLine line;
     line.p_value = p;
     line.runs = peak.which.size();
-    line.frequency = refined(runs, peak.which, peak.frequency, finest);
+    line.frequency =
+        refined(runs, peak.which, strongest_near(runs, peak.which, peak.frequency, finest), finest);
     measure(runs, spectra, peak.which, line);
     lines.push_back(std::move(line));
   }
