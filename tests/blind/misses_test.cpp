@@ -121,4 +121,27 @@ TEST(Moments, that_fitted_runs_leave_open_are_told_by_the_others) {
       << text.substr(0, 1500);
 }
 
+// Every fitted run that moves came after the slip. Held-out runs that came after it too cannot tell it from an offset, and do not.
+TEST(Moments, that_no_run_tells_are_told_by_none) {
+  const std::string bin = ISAC_BIN_DIR,
+                    day =
+                        (std::filesystem::temp_directory_path() / ("isac-still-" + std::to_string(getpid())))
+                            .string(),
+                    answer = day + ".txt";
+  const std::string call = bin + "/blind_generate --out " + day + " --label " + day +
+                           ".json --seed 5173157808165243969" +
+                           " --noise white --effect encoder_slip --ratio 0.75 > /dev/null && cd " + day +
+                           "/heldout && rm run_02.csv run_03.csv run_04.csv run_10.csv && " + bin +
+                           "/isac-explain " + day + " > " + answer + " 2>&1";
+  EXPECT_EQ(std::system(call.c_str()), 0) << call;
+  std::string text, word;
+  for (std::ifstream in(answer); in >> word;) text += word + ' ';
+  std::filesystem::remove_all(day);
+  std::filesystem::remove(day + ".json");
+  std::filesystem::remove(answer);
+  EXPECT_EQ(text.find("Encoder slips once"), std::string::npos) << text.substr(0, 1500);
+  EXPECT_NE(text.find("iddle position off"), std::string::npos) << text.substr(0, 1500);
+  EXPECT_NE(text.find("onstant torque"), std::string::npos) << text.substr(0, 1500);
+}
+
 }  // namespace

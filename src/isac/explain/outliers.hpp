@@ -7,7 +7,8 @@
 ///
 /// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: the tail ln(1/S) = (x/a)^k that passes through both is continued
 /// to where one of N samples passes with probability α (k is 1 for Laplace's noise, 1.5 here for normal noise, whose own tail is thinner
-/// still). What passes so holds a quarter of s for sure, or is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5,
+/// still). First, where 25 or more pass 6.5 s (or 3 quanta) and the tail holds a twenty-fifth of them there at most, that is the limit. Else what
+/// passes holds a quarter of s for sure, or is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5,
 /// q98/ln 50), and 8 s at least: steps of a converter bend a tail the other way. Five must pass before they count as spikes (raw_effects.cpp). s is the standard deviation of white
 /// noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
 /// Units: the signal's. Threads: pure. Errors: none.

@@ -2,7 +2,8 @@
 /// The proof: the gap before and after on runs that no fit, test or choice has seen, against the noise floor and the model
 /// that says nothing moves.
 ///
-/// No choice but one: when an encoder slipped, where fitted runs cannot tell (slip_moment.hpp), and the answer says so.
+/// They may take away a name and say in which reading the gap is told (doubt.hpp, explain.cpp), and choose when an encoder slipped, or that it did,
+/// where fitted runs cannot tell (slip_moment.hpp); the answer says so. Decision 0171.
 /// This is the only place that opens HeldOut. Parameters stay as they were fitted. Residuals are at the recording's rate, raw.
 /// Units: the signal's. Threads: pure. Errors: none; runs that cannot be compared are left out.
 /// Source: docs/derivations/explain.md.

@@ -187,7 +187,7 @@ std::string slip_instead(const Predictor& predictor, const Library& library, con
     return proof.freed(other.model.model, model, found.weights, Chain::kTorque).behind;
   };
   const Comparison first = behind(found.model.model);
-  if (first.t < kClearlyASlip) return "";
+  if (leaves_open(first) || first.t < kClearlyASlip) return "";
   const std::string instead = library.hypotheses[static_cast<std::size_t>(found.added.front())].info().term;
   for (Trial& t : order) {
     if (&t == &order.front()) {

@@ -31,7 +31,7 @@ void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& r
 [[nodiscard]] std::string settle_slip(const Predictor& predictor, const Library& library, const Proof& proof,
                                       Found& found);
 
-/// Where every fitted run that could tell was recorded after the slip, an offset fits as well and has fewer parameters. If the held-out rows have
+/// Where every fitted run that could tell was recorded after the slip, an offset fits as well and has fewer parameters, and a drift may. If the held-out rows have
 /// the slip ahead by three sigma, it takes the place of what was named alone, and they say which rivals are left. What to tell of it; else empty.
 [[nodiscard]] std::string slip_instead(const Predictor& predictor, const Library& library, const Proof& proof,
                                        Found& found);
