@@ -12,7 +12,7 @@
 namespace isac::report {
 
 inline constexpr double kFontSize = 12;
-inline constexpr double kLeftMargin = 68;  ///< room for the y ticks and the y label
+inline constexpr double kLeftMargin = 84;  ///< room for the y ticks and the y label
 
 struct LegendEntry {
   const Curve* curve = nullptr;
