@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "known_runs.hpp"
 #include "plant.hpp"
@@ -80,8 +81,11 @@ Dataset make_dataset(const Request& request) {
   Random of_rig = master.fork(), of_day = master.fork(), of_noise = master.fork(), of_shape = master.fork();
   Dataset d;
   d.request = request;
-  d.rig = draw_rig(of_rig);
-  d.runs = draw_day(d.rig, of_day);
+  if (request.day != "drawn" && request.day != "protocol")
+    throw std::invalid_argument("a day is drawn or protocol, not '" + request.day + "'");
+  const bool protocol = request.day == "protocol";
+  d.rig = protocol ? draw_other_rig(of_rig) : draw_rig(of_rig);
+  d.runs = protocol ? draw_protocol_day(d.rig, of_day) : draw_day(d.rig, of_day);
   d.noise = draw_noise(request.noise, d.rig, of_noise, request.recordings);
   for (const std::string& id : request.ids) {
     const Effect& one = effect(id);

@@ -19,6 +19,7 @@ struct Request {
   double ratio = 0.75;                ///< gap left by the refitted base model over the noise floor
   std::string noise = "white";
   std::filesystem::path recordings = {};  ///< of `real` noise
+  std::string day = "drawn";              ///< or "protocol": another joint, and a day by a written protocol
 };
 
 /// One hidden effect at its strength.
@@ -55,7 +56,7 @@ Strength strength_of(const Gap& gap, const Noise& noise, const Rig& rig);
 /// result stays below when even the largest plausible amplitude does not reach it.
 Hiding hide(const Effect& effect, const Shape& shape, const Dataset& dataset, double ratio);
 
-/// Everything but the files. Throws std::invalid_argument for an unknown id or kind of noise.
+/// Everything but the files. Throws std::invalid_argument for an unknown id, day or kind of noise.
 Dataset make_dataset(const Request& request);
 
 /// Residual noise of the base model on the held-out runs, were the truth known: torque, pressure, balance.

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <set>
 
+#include "day_parts.hpp"
 #include "label.hpp"
 
 namespace blind {
@@ -60,9 +61,7 @@ TEST(Dataset, hides_two_effects_each_at_its_own_strength) {
   EXPECT_NE(d.hidings[0].signal, d.hidings[1].signal);
 }
 
-TEST(Dataset, has_ten_minutes_in_fifteen_runs_of_every_kind_of_which_five_are_held_out) {
-  Random random(8);
-  const std::vector<RunPlan> runs = draw_day(Rig{}, random);
+void expect_a_day(const std::vector<RunPlan>& runs, std::size_t count) {
   int rows = 0, heldout = 0;
   double before = -1.0;
   std::set<std::string> fitted, kept;
@@ -73,11 +72,45 @@ TEST(Dataset, has_ten_minutes_in_fifteen_runs_of_every_kind_of_which_five_are_he
     EXPECT_GT(run.started, before) << "runs of one day, one after another";
     before = run.started + run.rows() * kRowTime;
   }
-  EXPECT_EQ(runs.size(), 15u);
+  EXPECT_EQ(runs.size(), count);
   EXPECT_EQ(heldout, 5);
   EXPECT_NEAR(rows * kRowTime, 600.0, 30.0);
   EXPECT_EQ(fitted, kept);
   EXPECT_EQ(fitted, (std::set<std::string>{"constant-pressure", "constant-angle", "free", "pcu-step"}));
+}
+
+TEST(Dataset, has_ten_minutes_in_fifteen_runs_of_every_kind_of_which_five_are_held_out) {
+  Random random(8);
+  expect_a_day(draw_day(Rig{}, random), 15);
+}
+
+TEST(Dataset, has_another_day_by_a_protocol_whose_first_test_comes_again_at_the_end) {
+  Random random(8);
+  const Rig rig = draw_other_rig(random);
+  const std::vector<RunPlan> runs = draw_protocol_day(rig, random);
+  expect_a_day(runs, 17);
+  EXPECT_EQ(runs.front().hand, runs.back().hand);
+  EXPECT_EQ(runs.front().command_1, runs.back().command_1);
+  EXPECT_GT(runs.back().started - runs.front().started, 600.0);
+  for (const RunPlan& run : runs)
+    for (const double angle : run.hand) ASSERT_LE(std::abs(angle), reach(rig, 0.0, rig.p0 + 0.7)) << run.name;
+}
+
+TEST(Dataset, gives_the_truth_of_another_joint_back_from_a_day_by_a_protocol) {
+  for (const std::uint64_t seed : {1u, 2u}) {
+    const Dataset d = make_dataset({.seed = seed, .day = "protocol"});
+    EXPECT_NE(d.rig.r, Rig{}.r);
+    EXPECT_NEAR(d.base.A / d.rig.A, 1.0, 1e-5);
+    EXPECT_NEAR(d.base.B / d.rig.B, 1.0, 1e-5);
+    EXPECT_NEAR(d.base.C / d.rig.C, 1.0, 5e-3);
+    EXPECT_NEAR(d.base.D / d.rig.D, 1.0, 1e-3);
+    EXPECT_NEAR(d.base.T_C / d.rig.T_C, 1.0, 1e-4);
+    EXPECT_LT(strength_of(d.gap, d.noise, d.rig).ratio, 0.12);
+  }
+}
+
+TEST(Dataset, refuses_a_day_that_does_not_exist) {
+  EXPECT_THROW(make_dataset({.day = "sunday"}), std::invalid_argument);
 }
 
 class Folder {

@@ -55,9 +55,12 @@ void save(const std::filesystem::path& file, const std::string& text) {
 }
 
 std::string rig_toml(const Dataset& d) {
-  std::string text =
-      "format = \"isac.rig/1\"\nname = \"testbed\"\n\n[joint]\nchain_wheel_diameter = \"38 mm\"\n"
-      "initial_pressure = \"3.0 kg/cm2\"\ninertia = \"";
+  std::string text = "format = \"isac.rig/1\"\nname = \"testbed\"\n\n[joint]\nchain_wheel_diameter = \"";
+  // To a tenth of a millimetre and of a unit of pressure, as the rigs are drawn: 38 and 3.0 of the seed's.
+  put(text, 2000.0 * d.rig.r, d.rig.r == 0.019 ? 0 : 1);
+  text += " mm\"\ninitial_pressure = \"";
+  put(text, d.rig.p0, 1);
+  text += " kg/cm2\"\ninertia = \"";
   put(text, d.rig.inertia, 9);
   text += " kg m2\"\n\n[encoder]\nsteps_per_turn = 8000\n\n[sensors]\nforce_noise = \"";
   put(text, d.noise.force_white, 3);

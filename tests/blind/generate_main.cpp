@@ -12,9 +12,10 @@ namespace {
 
 constexpr const char* kUsage =
     "blind_generate --out FOLDER --label FILE [--seed N] [--effect ID[,ID]] [--ratio X] [--noise KIND] "
-    "[--oracle]\n"
+    "[--day DAY] [--oracle]\n"
     "blind_generate --list\n"
     "  KIND is white, coloured, quantised or real (real reads the folder ISAC_REAL_DATA)\n"
+    "  DAY is drawn (default) or protocol: another joint, strokes all alike, sines, levels out of a table\n"
     "  without --effect, or with --effect none, nothing is hidden\n"
     "ends with 0: written; 1: the effect cannot reach the ratio with a plausible size, only the label is "
     "written;\n"
@@ -58,6 +59,8 @@ Words read_words(int count, char** words) {
       w.request.ratio = std::stod(next());
     else if (word == "--noise")
       w.request.noise = next();
+    else if (word == "--day")
+      w.request.day = next();
     else if (word == "--effect")
       w.request.ids = split(next());
     else

@@ -35,6 +35,7 @@ std::string label_of(const Dataset& d, const Gap& noise, const Gap& closes, cons
   json.open('{').field("schema", "isac.blind/1").field("seed", std::to_string(d.request.seed));
   json.field("kind", unknown ? "unknown" : kinds[std::min<std::size_t>(2, d.hidings.size())]);
   json.field("noise", d.noise.kind)
+      .field("day", d.request.day)
       .field("ratio_asked", d.request.ratio)
       .field("testable", d.not_testable.empty());
   if (!d.not_testable.empty()) json.field("not_testable", d.not_testable);

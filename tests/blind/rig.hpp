@@ -43,7 +43,12 @@ struct Signals {
   std::vector<double> angle, p1, p2, F1, F2;
 };
 
-/// About fifteen runs of one day, ten minutes in all, five of them held out.
+/// About fifteen runs of one day, ten minutes in all, five of them held out; no stroke is like another.
 std::vector<RunPlan> draw_day(const Rig& rig, Random& random);
+
+/// Another joint: other chain wheel (in 0.1 mm), initial pressure, inertia and valve lag, muscles within ±40 %.
+Rig draw_other_rig(Random& random);
+/// Seventeen runs by a written protocol, ten minutes in all, five held out: equal strokes, sines, a chirp, tables of levels.
+std::vector<RunPlan> draw_protocol_day(const Rig& rig, Random& random);
 
 }  // namespace blind

@@ -27,8 +27,8 @@ extern char** environ;
 namespace {
 
 constexpr const char* kUsage =
-    "blind_run --results FILE --explain PROGRAM [--tier NAMES] [--noise KINDS] [--effect IDS] [--count N] "
-    "[--seed N]\n"
+    "blind_run --results FILE --explain PROGRAM [--tier NAMES] [--noise KINDS] [--day DAY] [--effect IDS] "
+    "[--count N] [--seed N]\n"
     "          [--jobs N] [--timeout S] [--oracle] [--twin] [--baselines PROGRAM] [-- WORDS FOR PROGRAM]\n"
     "  NAMES of none, strong, clear, faint, pair, outside (also called unknown), leave-one-out (comma "
     "between;\n"
@@ -47,6 +47,7 @@ struct Plan {
   std::vector<std::string> tiers = {"none", "strong", "clear", "faint", "pair", "outside"};
   std::vector<std::string> noises = {"white", "coloured", "quantised", "real"};
   std::vector<std::string> only, words;
+  std::string day = "drawn";
   int count = 1, jobs = 1;
   std::uint64_t seed = 1;
   double timeout = 120.0;
@@ -97,6 +98,8 @@ Plan read_plan(int count, char** list) {
       plan.tiers = split(value);
     else if (word == "--noise")
       plan.noises = split(value);
+    else if (word == "--day")
+      plan.day = value;
     else if (word == "--effect")
       plan.only = split(value);
     else if (word == "--count")
@@ -172,6 +175,7 @@ class Tasks {
     std::string rest = "/" + noise + "/";
     for (std::size_t k = 0; k < ids.size(); ++k) rest += (k > 0 ? "+" : "") + ids[k];
     rest += "/" + std::to_string(plan_.seed) + "." + std::to_string(i);
+    if (plan_.day != "drawn") rest += "/" + plan_.day;
     blind::Request request;
     const bool left_out = tier == kLeftOut;
     request.seed = seed_of((left_out ? "clear" : tier) + rest);  // the very dataset, now without its name
@@ -179,6 +183,7 @@ class Tasks {
     request.ratio = ratio;
     request.noise = noise;
     request.recordings = plan_.recordings;
+    request.day = plan_.day;
     list.push_back({tier + rest, std::move(request), left_out});
   }
 
