@@ -10,11 +10,11 @@
 namespace {
 
 struct Miss {
-  const char *tier, *noise, *effect, *seed, *answer, *was;
+  const char *tier, *noise, *effect, *seed, *answer, *was, *day = "drawn";
 };
 
 void PrintTo(const Miss& miss, std::ostream* out) {
-  *out << miss.tier << " " << miss.noise << " " << miss.effect << " " << miss.seed;
+  *out << miss.tier << " " << miss.noise << " " << miss.effect << " " << miss.seed << " " << miss.day;
 }
 
 class Misses : public ::testing::TestWithParam<Miss> {};
@@ -25,8 +25,8 @@ TEST_P(Misses, are_answered_rightly) {
                                                    ("isac-misses-" + std::to_string(getpid()) + ".jsonl"))
                                                       .string();
   const std::string call = bin + "/blind_run --tier " + miss.tier + " --noise " + miss.noise + " --effect " +
-                           miss.effect + " --seed " + miss.seed + " --results " + results + " --explain " +
-                           bin + "/isac-explain > /dev/null 2>&1";
+                           miss.effect + " --seed " + miss.seed + " --day " + miss.day + " --results " +
+                           results + " --explain " + bin + "/isac-explain > /dev/null 2>&1";
   const int status = std::system(call.c_str());
   std::string line;
   std::getline(std::ifstream(results) >> std::ws, line);
@@ -81,6 +81,14 @@ INSTANTIATE_TEST_SUITE_P(
              "unknown, for what closed next to nothing stood first"},
         Miss{"faint", "quantised", "torque_ripple", "6201", "theheld-outrunsrefutethatname",
              "a slip beside it, with which held-out runs were half as far off again"},
+        Miss{"clear", "white", "series_elasticity", "7001", R"("effects":[{"id":"series_elasticity")",
+             "unknown, for it was taken to ring from the start of what the kernel leaves of a release",
+             "protocol"},
+        Miss{"clear", "white", "threshold_pressure", "7001", R"("effects":[{"id":"threshold_pressure")",
+             "nothing, for only a free joint fell below that pressure", "protocol"},
+        Miss{"clear", "quantised", "dead_time", "7001", R"("verdict":"immaterial")",
+             "unknown in the torque, where even strokes let the encoder's steps beat with the clock",
+             "protocol"},
         Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
              "nothing, for no function of the angle has fifteen waves"},
         Miss{"leave-one-out", "coloured", "threshold_pressure", "5901", R"("verdict":"unknown")",

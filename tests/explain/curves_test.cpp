@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "isac/core/units.hpp"
 #include "isac/explain/explain.hpp"
 #include "prepared_day.hpp"
 
@@ -60,6 +61,24 @@ TEST(Curves, are_no_run_that_is_off_as_a_whole) {
   const Bench b;
   const Curve curve = b.clearest(b.with([](unsigned run, unsigned) { return run == 2 ? 3.0 : 0.0; }));
   EXPECT_FALSE(stands_out(curve)) << curve.variable << " " << curve.z;
+}
+
+// At an even speed of about a step for each sample the encoder's steps beat with the clock: its error is in the residual, and in the velocity.
+TEST(Curves, are_no_beats_of_the_encoder_with_the_clock) {
+  const auto found = [](double steps_for_each_sample) {
+    Bench b;
+    PreparedRun& run = b.day.data.runs[0];
+    const double step = b.day.data.rig.angle_step, even = steps_for_each_sample * step / run.interval;
+    const double turn = 2 * kPi * 9 * run.interval;  // 9 Hz
+    for (std::size_t k = 0; k < run.velocity.size(); ++k)
+      run.velocity[k] = even + 0.5 * step * turn / run.interval * std::cos(turn * static_cast<double>(k));
+    return stands_out(b.clearest(b.with([&](unsigned r, unsigned k) {
+      return r == 0 ? 3.0 * std::cos(turn * static_cast<double>(k)) : 0.0;
+    })));
+  };
+  EXPECT_FALSE(found(1.01));
+  EXPECT_FALSE(found(0.51));
+  EXPECT_TRUE(found(0.8));  // a dependence on the speed like any other
 }
 
 TEST(Curves, below_what_matters_are_nothing) {

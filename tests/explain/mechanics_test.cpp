@@ -57,6 +57,34 @@ TEST(Compliance, within_the_known_inertia_comes_back_although_nobody_saw_its_far
   EXPECT_GT(within.gain, 1.2 * fitted(bench, "inertia_error").gain);
 }
 
+PlannedRun let_go(double seconds, double angle) {
+  PlannedRun run = test::free_in_steps(seconds, 2.0, 0.0);
+  run.middle_rad = angle;
+  run.waveform = "hold";
+  return run;
+}
+
+// A joint that is let go moves before the first sample, for all that a kernel leaves of it; its far side began at rest.
+TEST(Compliance, is_told_by_joints_that_are_let_go) {
+  TiedRig rig;
+  rig.far_inertia = 0.0035;
+  rig.far_hertz = 13;
+  const Bench bench(rig, {by_hand(30, 0.35, 1.0), let_go(6, 0.5), let_go(6, -0.4), let_go(6, 0.3),
+                          test::clamped(24, 0.1, 0.5, 12)});
+  const Fitted within = fitted(bench, "series_elasticity_within");
+  EXPECT_NEAR(within.values[0], rig.far_inertia, 0.05 * rig.far_inertia);
+  EXPECT_NEAR(within.values[1], rig.far_hertz, 0.01 * rig.far_hertz);
+  EXPECT_GT(within.gain, 1.3 * fitted(bench, "inertia_error").gain);
+  // What the linear screen prefers lies where the refit gets there.
+  const Screen s = screen(around(bench.predictor, bench.stem, bench.weights), bench.library, {.flips = 99});
+  const auto begun = std::find_if(s.candidates.begin(), s.candidates.end(), [&](const Screened& c) {
+    return bench.library.hypotheses[static_cast<std::size_t>(c.hypothesis)].info().id ==
+           std::string("series_elasticity_within");
+  });
+  ASSERT_NE(begun, s.candidates.end());
+  EXPECT_NEAR(begun->start[1], rig.far_hertz, 1.0);
+}
+
 TEST(ForceLag, of_a_third_of_a_sample_comes_back) {
   for (const double lag : {0.0006, 0.002, 0.006}) {
     TiedRig rig;

@@ -18,9 +18,39 @@ constexpr double kStandsOut = 4.5;
 constexpr std::size_t kOfMotion = 2;  // the first ones
 constexpr const char* kVariables[] = {"angle", "velocity", "delta_pressure", "p1", "p2"};
 
-double value_of(const PreparedRun& run, std::size_t sample, std::size_t variable) {
+/// At an even speed near half a step for each sample, or a multiple of that, an encoder's steps beat with the clock, slowly enough to pass
+/// any kernel: the reading's error is in the residual then, and its derivative in the velocity.
+bool beats_with_clock(double velocity, double acceleration, double step, double interval) {
+  constexpr double kPassesKernel = 40, kWhile = 0.1;  // Hz, s
+  if (!(std::isfinite(step) && step > 0)) return false;
+  const double steps = velocity * interval / step;  // for each sample
+  const double nearest = 0.5 * std::round(2 * steps);
+  return nearest != 0 && std::abs(steps - nearest) < kPassesKernel * interval &&
+         std::abs(acceleration) * kWhile < kPassesKernel * step;
+}
+
+/// Velocities; not a number where the encoder's steps beat with the clock.
+std::vector<std::vector<double>> velocities_of(const Prepared& data) {
+  constexpr double kSmooth = 0.05;  // s
+  std::vector<std::vector<double>> all;
+  for (const PreparedRun& run : data.runs) {
+    std::vector<double>& velocity = all.emplace_back(run.velocity);
+    if (velocity.size() < 2) continue;
+    const std::vector<double> smooth = wide_low_pass(run.velocity, kSmooth / run.interval);
+    for (std::size_t k = 0; k < velocity.size(); ++k) {
+      const std::size_t a = k - std::min<std::size_t>(k, 1), b = std::min(k + 1, velocity.size() - 1);
+      const double acceleration = (smooth[b] - smooth[a]) / (static_cast<double>(b - a) * run.interval);
+      if (beats_with_clock(smooth[k], acceleration, data.rig.angle_step, run.interval))
+        velocity[k] = std::nan("");
+    }
+  }
+  return all;
+}
+
+double value_of(const PreparedRun& run, const std::vector<double>& velocity, std::size_t sample,
+                std::size_t variable) {
   if (variable < 2) {
-    const std::vector<double>& x = variable == 0 ? run.angle : run.velocity;
+    const std::vector<double>& x = variable == 0 ? run.angle : velocity;
     return x.empty() ? std::nan("") : x[sample];
   }
   if (!run.has_pressure) return std::nan("");
@@ -68,13 +98,13 @@ std::vector<double> borders_of(std::vector<double> values) {
 }
 
 /// z and the rms of the bins' means, in σ.
-std::pair<double, double> dependence(const Prepared& data, const Rows& rows, std::size_t variable,
-                                     std::uint64_t seed) {
+std::pair<double, double> dependence(const Prepared& data, const std::vector<std::vector<double>>& velocities,
+                                     const Rows& rows, std::size_t variable, std::uint64_t seed) {
   std::vector<double> values;
   std::vector<std::size_t> of;
   for (std::size_t k = 0; k < rows.index.size(); ++k) {
     const Row& row = data.rows[rows.index[k]];
-    const double x = value_of(data.runs[row.run], row.sample, variable);
+    const double x = value_of(data.runs[row.run], velocities[row.run], row.sample, variable);
     if (!std::isfinite(x)) continue;
     values.push_back(x);
     of.push_back(k);
@@ -125,6 +155,7 @@ Curve clearest_curve(const Prepared& data, const Weights& weights, const Floors&
                      const Eigen::VectorXd& weighted, double material, std::uint64_t seed) {
   Curve clearest;
   const Eigen::VectorXd plain = unfiltered(data, weights, weighted);
+  const std::vector<std::vector<double>> velocities = velocities_of(data);
   for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
     if (!data.has(chain)) continue;
     const auto c = static_cast<int>(chain);
@@ -134,7 +165,7 @@ Curve clearest_curve(const Prepared& data, const Weights& weights, const Floors&
     const std::size_t variables =
         chain == Chain::kTorque || chain == Chain::kMotion ? std::size(kVariables) : kOfMotion;
     for (std::size_t v = 0; v < variables; ++v) {
-      const auto [z, rms] = dependence(data, rows, v, seed);
+      const auto [z, rms] = dependence(data, velocities, rows, v, seed);
       const double size = rms * weights.sigma[c] / floor;
       if (size >= material && z > clearest.z) clearest = {z, size, chain, kVariables[v]};
     }

@@ -151,7 +151,8 @@ std::string closing(const Explanation& e) {
     return fmt::format("{} → {} on held-out runs, freed of the noise's slow part", rounded(gap.freed_before),
                        with_unit(gap.freed_after, gap.unit));
   const bool heldout = std::isfinite(gap.heldout_before) && std::isfinite(gap.heldout_after);
-  if (heldout && gap.heldout_after >= gap.heldout_before)
+  constexpr double kHardly = 0.995;  // of the rms before
+  if (heldout && gap.heldout_after > kHardly * gap.heldout_before)
     return fmt::format("{} → {} on the fitted runs; the held-out ones hardly show it", rounded(gap.before),
                        with_unit(gap.after, gap.unit));
   const double before = heldout ? gap.heldout_before : gap.before;

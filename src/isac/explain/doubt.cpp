@@ -71,7 +71,9 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
     free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;
   }
-  if (!worse || (gap.heldout_after <= kAbout * gap.heldout_before && freed.behind.t >= kHardly)) {
+  // Rows in which the two models differ by less than three sigma of data do not show the effect, and refute nothing.
+  const bool hardly = freed.behind.t >= kHardly || freed.behind.separation < kSetLimit;
+  if (!worse || (gap.heldout_after <= kAbout * gap.heldout_before && hardly)) {
     if (slow && gap.heldout_after > gap.heldout_before && freed.behind.t > 0 && freed.first < freed.second)
       free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;

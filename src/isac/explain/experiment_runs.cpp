@@ -291,6 +291,8 @@ std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint
     for (double& angle : run.raw_angle) angle = step * std::round(angle / step);
   run.dry_velocity = dry_velocity(run.raw_angle, run.velocity, run.interval, before.rig.angle_step);
   run.slow_acceleration = run.acceleration;
+  if (run.is_free)
+    run.swing = {.angle = run.angle, .velocity = run.velocity, .acceleration = run.acceleration, .lead = 0};
   run.torque.assign(n, 0.0);
   run.smooth_torque = run.slow_torque = run.torque;
   data.runs.push_back(std::move(run));

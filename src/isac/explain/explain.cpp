@@ -15,6 +15,7 @@
 #include "isac/explain/describe.hpp"
 #include "isac/explain/doubt.hpp"
 #include "isac/explain/experiment.hpp"
+#include "isac/explain/free_torque.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/number_doubts.hpp"
 #include "isac/explain/proof.hpp"
@@ -114,6 +115,10 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   gap.noise_floor =
       scale * (chain == Chain::kMotion ? std::hypot(found.weights.sigma[c], found.floors.slow[c])
                                        : found.floors.all(chain));
+  // What an adequate model leaves of the fitted runs, nothing significant, is noise, also what neighbouring samples do not differ by.
+  const bool all_found = found.adequate && !found.added.empty() && found.steps.size() > found.added.size() &&
+                         !found.steps.back().gate.significant;
+  if (all_found && gap.after < gap.before) gap.noise_floor = std::max(gap.noise_floor, gap.after);
   if (proof.runs() == 0) return;
   const Sums before = proof.residual(user, chain), after = proof.residual(found.model.model, chain);
   gap.heldout_before = scale * before.rms();
@@ -121,7 +126,8 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   gap.heldout_zero_model = scale * before.signal_rms();
   const double floor2 = gap.noise_floor * gap.noise_floor,
                open = gap.heldout_before * gap.heldout_before - floor2;
-  if (open > 0) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
+  constexpr double kShowing = 0.02;  // of the floor's square; less is not known so well
+  if (open > kShowing * floor2) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
 /// An effect of the forces enters the torque and, where the joint is free, its motion. Where slow noise decides in one of them, and by little if it
@@ -175,9 +181,14 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   auto predictor_here = std::make_unique<Predictor>(data, options.threads);
   const Look first{.provisional = true, .contenders = {}};
   Found found = search(*predictor_here, *library_here, data, options, first);
-  if (found.wants_torque_of_free_runs) {
+  const bool nothing = found.added.empty() && !(found.gate.significant && found.gate.material);
+  const bool unseen = !found.wants_torque_of_free_runs && nothing && can_add_torque_of_free_runs(data) &&
+                      free_torque_is_off(*predictor_here, found.model.model);
+  if (found.wants_torque_of_free_runs || unseen) {
     if (options.progress)
-      options.progress("the force sensors' zero wanders: free runs tell it beside their motion");
+      options.progress(unseen
+                           ? "the torque of free runs is further off than that of others: it is fitted too"
+                           : "the force sensors' zero wanders: free runs tell it beside their motion");
     add_torque_of_free_runs(data);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data, options.threads);

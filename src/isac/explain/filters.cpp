@@ -12,6 +12,7 @@ namespace {
 constexpr double kWideKernel = 0.020;                 // s, for velocities that the encoder resolves badly
 constexpr double kQuietKernel = 0.015;                // s, for velocities that change slowly
 constexpr double kQuietKernelOfAcceleration = 0.025;  // s, beside a narrow one of 0.020 s
+constexpr double kQuietKernelOfSwing = 0.050;         // s, which a resonance of up to 18 Hz does not hear
 
 }  // namespace
 
@@ -131,29 +132,56 @@ std::vector<double> low_pass_derivative(std::span<const double> x, double sigma,
 
 namespace {
 
-/// The derivative of an encoder's reading by a wider kernel, where what it differs by from the narrow one's is no more than the steps make.
-std::vector<double> quiet_derivative(std::span<const double> raw_angle, double sigma, double wide_sigma,
-                                     double interval, double angle_step, int order) {
-  std::vector<double> out = low_pass_derivative(raw_angle, sigma, interval, order);
-  if (!(std::isfinite(angle_step) && angle_step > 0) || wide_sigma <= sigma) return out;
-  // w = g_w′ ∗ φ, u = 1 − g_w∗: w + (1 − α) u w + ½ (1 − α)(2 − α) u² w, α = σ²/σ_w², the beginning of (1 − u)^(α−1) w, has the second and the
-  // fourth moment of g: a smooth motion passes it as it passes g′. (With the second alone a hand's reversals left 8e-5 N m s of a velocity that
-  // is remembered for 0.1 s, two sigma in every day.)
-  const std::vector<double> wide = low_pass_derivative(raw_angle, wide_sigma, interval, order),
+/// By the kernel, and by a wider one.
+struct TwoWays {
+  std::vector<double> narrow, slow;
+};
+
+std::vector<double> derivative_of(std::span<const double> x, double sigma, double interval, int order) {
+  return order == 0 ? low_pass(x, sigma) : low_pass_derivative(x, sigma, interval, order);
+}
+
+/// w = g_w′ ∗ φ, u = 1 − g_w∗: w + (1 − α) u w + ½ (1 − α)(2 − α) u² w, α = σ²/σ_w², the beginning of (1 − u)^(α−1) w, has the second and the
+/// fourth moment of g: a smooth motion passes it as it passes g′. (With the second alone a hand's reversals left 8e-5 N m s of a velocity that
+/// is remembered for 0.1 s, two sigma in every day.)
+TwoWays two_ways(std::span<const double> raw_angle, double sigma, double wide_sigma, double interval,
+                 int order) {
+  TwoWays both{.narrow = derivative_of(raw_angle, sigma, interval, order), .slow = {}};
+  const std::vector<double> wide = derivative_of(raw_angle, wide_sigma, interval, order),
                             wider = low_pass(wide, wide_sigma), widest = low_pass(wider, wide_sigma);
   const double bend = 1 - sigma * sigma / (wide_sigma * wide_sigma), second = 0.5 * bend * (1 + bend);
-  std::vector<double> slow(wide.size()), difference(wide.size());
-  for (std::size_t k = 0; k < slow.size(); ++k) {
-    slow[k] = wide[k] + bend * (wide[k] - wider[k]) + second * (wide[k] - 2 * wider[k] + widest[k]);
-    difference[k] = (out[k] - slow[k]) * (out[k] - slow[k]);
-  }
-  const std::vector<double> power = wide_low_pass(difference, 2 * wide_sigma);
+  both.slow.resize(wide.size());
+  for (std::size_t k = 0; k < wide.size(); ++k)
+    both.slow[k] = wide[k] + bend * (wide[k] - wider[k]) + second * (wide[k] - 2 * wider[k] + widest[k]);
+  return both;
+}
+
+/// 0 where what the two ways differ by is no more than the encoder's steps make of it, 1 where it is twice as much.
+std::vector<double> share_beyond_steps(const TwoWays& both, double sigma, double wide_sigma, double interval,
+                                       double angle_step, int order) {
+  std::vector<double> difference(both.slow.size());
+  for (std::size_t k = 0; k < difference.size(); ++k)
+    difference[k] = (both.narrow[k] - both.slow[k]) * (both.narrow[k] - both.slow[k]);
+  std::vector<double> share = wide_low_pass(difference, 2 * wide_sigma);
   double gain = 0;  // of white noise by the derivative
   for (const double g : gaussian(std::max(sigma, 1.0), order)) gain += g * g;
   const double expected = angle_step * angle_step / 12 * gain / std::pow(interval, 2 * order);
-  for (std::size_t k = 0; k < slow.size(); ++k)
-    out[k] = slow[k] + std::clamp((power[k] / expected - 1.5) / 1.5, 0.0, 1.0) * (out[k] - slow[k]);
-  return out;
+  for (double& s : share) s = std::clamp((s / expected - 1.5) / 1.5, 0.0, 1.0);
+  return share;
+}
+
+void mix(const std::vector<double>& share, const std::vector<double>& slow, std::vector<double>& narrow) {
+  for (std::size_t k = 0; k < narrow.size(); ++k) narrow[k] = slow[k] + share[k] * (narrow[k] - slow[k]);
+}
+
+/// The derivative of an encoder's reading by a wider kernel, where what it differs by from the narrow one's is no more than the steps make.
+std::vector<double> quiet_derivative(std::span<const double> raw_angle, double sigma, double wide_sigma,
+                                     double interval, double angle_step, int order) {
+  if (!(std::isfinite(angle_step) && angle_step > 0) || wide_sigma <= sigma)
+    return derivative_of(raw_angle, sigma, interval, order);
+  TwoWays both = two_ways(raw_angle, sigma, wide_sigma, interval, order);
+  mix(share_beyond_steps(both, sigma, wide_sigma, interval, angle_step, order), both.slow, both.narrow);
+  return std::move(both.narrow);
 }
 
 }  // namespace
@@ -166,6 +194,40 @@ std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sig
 std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma, double interval,
                                        double angle_step) {
   return quiet_derivative(raw_angle, sigma, kQuietKernelOfAcceleration / interval, interval, angle_step, 2);
+}
+
+namespace {
+
+/// What is let go covers in twice the time four times the way, what moves already twice.
+bool begins_at_rest(std::span<const double> raw_angle, double interval, double angle_step) {
+  constexpr double kClear = 8, kLate = 0.05, kOfRest = 3;  // steps, s, times the way
+  const double step = std::isfinite(angle_step) ? angle_step : 0.0;
+  const auto last = std::min((raw_angle.size() - 1) / 2, static_cast<std::size_t>(kLate / interval));
+  for (std::size_t k = 1; k <= last; ++k) {
+    const double way = std::abs(raw_angle[2 * k] - raw_angle[0]);
+    if (way > kClear * step) return way >= kOfRest * std::abs(raw_angle[k] - raw_angle[0]);
+  }
+  return true;
+}
+
+}  // namespace
+
+Motion quiet_motion(std::span<const double> raw_angle, double sigma, double interval, double angle_step) {
+  if (raw_angle.empty()) return {};
+  const double wide = kQuietKernelOfSwing / interval;
+  const bool from_rest = begins_at_rest(raw_angle, interval, angle_step);
+  const auto lead = static_cast<std::size_t>(std::ceil(kKernelReach * std::max(wide, sigma)));
+  std::vector<double> angle(lead, raw_angle.front());
+  angle.insert(angle.end(), raw_angle.begin(), raw_angle.end());
+  if (!(std::isfinite(angle_step) && angle_step > 0) || wide <= sigma)
+    return {derivative_of(angle, sigma, interval, 0), derivative_of(angle, sigma, interval, 1),
+            derivative_of(angle, sigma, interval, 2), lead, from_rest};
+  TwoWays orders[3];
+  for (int order = 0; order < 3; ++order) orders[order] = two_ways(angle, sigma, wide, interval, order);
+  const std::vector<double> share = share_beyond_steps(orders[2], sigma, wide, interval, angle_step, 2);
+  for (TwoWays& both : orders) mix(share, both.slow, both.narrow);
+  return {std::move(orders[0].narrow), std::move(orders[1].narrow), std::move(orders[2].narrow), lead,
+          from_rest};
 }
 
 std::vector<double> dry_velocity(std::span<const double> raw_angle, std::span<const double> velocity,

@@ -45,6 +45,17 @@ inline constexpr double kKernelReach =
 /// g″ ∗ φ by the same way: the steps are in the balance of the motion twice, where an inertia is looked for.
 [[nodiscard]] std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma_samples,
                                                      double interval, double angle_step);
+/// An angle and its two derivatives, low-passed; sample `lead` is the first of the recording.
+struct Motion {
+  std::vector<double> angle, velocity, acceleration;
+  std::size_t lead = 0;
+  bool from_rest = false;  ///< the recording begins before the joint moves, or as it is let go
+};
+/// g ∗ φ, g′ ∗ φ and g″ ∗ φ by the same way, all three where g″ ∗ φ is more than the steps make of it: what swings on a spring answers the
+/// encoder's steps with its resonance for as long as the joint moves at all. (No step known: as the kernel leaves them.) A joint that is let go
+/// at the first sample moves in g ∗ φ before that: the kernel's reach before the recording is there too, the joint at rest in it.
+[[nodiscard]] Motion quiet_motion(std::span<const double> raw_angle, double sigma_samples, double interval,
+                                  double angle_step);
 /// Velocity that can be told from standing still; slower than one step in kSlowestStep is none.
 [[nodiscard]] std::vector<double> dry_velocity(std::span<const double> raw_angle,
                                                std::span<const double> velocity, double interval,

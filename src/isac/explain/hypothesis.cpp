@@ -71,7 +71,8 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "creep" && at == 1) return {1, 4, 15, 60, 250};
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
   if (id == "series_elasticity" && at == 1) return {5, 7, 10, 14, 20, 28, 40};
-  if (id == "series_elasticity_within" && at == 1) return {7, 10, 14};
+  // What rings is found within its width only, 2 d f.
+  if (id == "series_elasticity_within" && at == 1) return {6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16.5};
   if (one_of(id, {"series_elasticity", "series_elasticity_within"}) && at == 2) return {0.05};
   if (one_of(id, {"backlash", "backlash_of_wheel"}) && at == 0) return {0.003, 0.015};
   if (id == "encoder_play" && at == 0) return {0.001, 0.004};
@@ -241,6 +242,8 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
     h.upper[2] = std::clamp(0.3 * reach.speed, 2 * h.lower[2], h.upper[2]);
   // Beyond the kernel of the motion's rows s − φ̈ is the fourth derivative of the encoder's noise, whose second is in the residual.
   if (string_view(info.id) == "series_elasticity_within") h.upper[1] = 18;
+  // What is damped more has no resonance that would tell it from an inertia, or from a lag.
+  if (h.id() == "series_elasticity") h.upper[2] = 0.7;
   h.dry = jumps_with_direction(effect, info);
   if (info.hook == Hook::kReading || info.hook == Hook::kDelay || info.hook == Hook::kOutlier) {
     const Touches t = touches(effect, info);

@@ -191,6 +191,13 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
       in.own_acceleration[k] = run.acceleration[k] * ratio;
       if (slow) in.own_slow_acceleration[k] = run.slow_acceleration[k] * ratio;
     }
+    if (in.swing != nullptr) {
+      in.own_swing = *in.swing;
+      // What hangs on the joint knows its motion only, no angle of its own: drifts and offsets are nothing to it.
+      for (auto* signal : {&in.own_swing.angle, &in.own_swing.velocity, &in.own_swing.acceleration})
+        for (double& value : *signal) value *= ratio;
+      in.swing = &in.own_swing;
+    }
     in.own_angle = std::move(truth);
   } else {
     const double sigma = data_->smoothing.torque / dt;
@@ -200,6 +207,10 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
     if (slow)
       in.own_slow_acceleration =
           quiet_acceleration(truth, data_->smoothing.motion / dt, dt, data_->rig.angle_step * ratio);
+    if (in.swing != nullptr) {
+      in.own_swing = quiet_motion(truth, sigma, dt, data_->rig.angle_step * ratio);
+      in.swing = &in.own_swing;
+    }
   }
   in.angle = &in.own_angle;
   in.velocity = &in.own_velocity;
@@ -250,6 +261,7 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
   in.acceleration = &run.acceleration;
   in.dry = &run.dry_velocity;
   in.slow_acceleration = &run.slow_acceleration;
+  if (!run.swing.angle.empty()) in.swing = &run.swing;
   in.pressure[0] = &run.pressure[0];
   in.pressure[1] = &run.pressure[1];
   if (run.angle.empty()) return shared;
@@ -293,6 +305,17 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
       for (std::size_t k = 0; k < slow.size(); ++k)
         in.own_slow_acceleration[k] = linear_between(slow, static_cast<double>(k) + shift);
       in.slow_acceleration = &in.own_slow_acceleration;
+    }
+    if (in.swing != nullptr) {
+      const Motion now = *in.swing;
+      in.own_swing = now;
+      for (std::size_t k = 0; k < now.angle.size(); ++k) {
+        const double at = static_cast<double>(k) + shift;
+        in.own_swing.angle[k] = between(now.angle, now.velocity, at, dt);
+        in.own_swing.velocity[k] = linear_between(now.velocity, at);
+        in.own_swing.acceleration[k] = linear_between(now.acceleration, at);
+      }
+      in.swing = &in.own_swing;
     }
   }
   for (const Active& a : model.effects) {

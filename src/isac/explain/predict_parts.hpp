@@ -67,9 +67,11 @@ struct BaselineOfPoint {
 struct Predictor::Inputs {
   const std::vector<double>*angle = nullptr, *velocity = nullptr, *acceleration = nullptr, *dry = nullptr,
         *slow_acceleration = nullptr;
+  const Motion* swing = nullptr;  ///< of a free joint; nullptr: angle, velocity and acceleration
   const std::vector<double>* pressure[2] = {nullptr, nullptr};
   std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration,
       own_pressure[2];
+  Motion own_swing;
   std::vector<double> columns;  ///< row-major: rows of the torque chain × terms
   mutable std::vector<double>
       terms;  ///< row-major: samples × terms, each with 1 for its parameter; empty until asked for

@@ -16,6 +16,7 @@ using models::JointPoint;
 constexpr double kEdge = 5;          // standard deviations of the kernel that a run's first row reaches into
 constexpr double kRing = 1.5;        // s, of the beginning
 constexpr double kAtStart = 0.05;    // rad: what hangs on a compliance may be this far off at the beginning
+constexpr double kAtRest = 0.001;    // rad, where the joint was at rest then
 constexpr double kRingNoise = 0.02;  // N m, of a sample
 
 /// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
@@ -79,10 +80,34 @@ class Memory {
   double z_[models::kMaxEffectStates] = {};
 };
 
+/// What swings on a free joint, from the kernel's reach before the recording on, where the joint rests.
+void add_swing(const Active& active, const Motion& joint, double interval, double sign,
+               std::vector<double>& sum) {
+  const auto at = [&](std::size_t k) {
+    JointPoint<double> x;
+    x.angle = joint.angle[k];
+    x.velocity = joint.velocity[k];
+    x.acceleration = joint.acceleration[k];
+    return x;
+  };
+  Memory memory(active);
+  JointPoint<double> x = at(0);
+  memory.rest(x);
+  for (std::size_t k = 0; k < joint.angle.size(); ++k) {
+    const JointPoint<double> next = at(k);
+    if (k > 0) memory.step(x, next, interval);
+    x = next;
+    if (k >= joint.lead)
+      sum[k - joint.lead] +=
+          sign * models::effect_torque(active.hypothesis->effect, active.values.data(), x, memory.state());
+  }
+}
+
 /// Where what hangs on a compliance stood when a recording began is not known, and it rings from there: c e^{λt}, λ = W (−d ± i √(1 − d²)),
-/// is fitted to what is left of the motion in the run's first moments, and added. (Parameters: J2, f, d.)
+/// is fitted to what is left of the motion in the run's first moments, and added: within `off_by` rad. (Parameters: J2, f, d.)
 void add_ring(const PreparedRun& run, const Values& q, double inertia, double sigma,
-              const std::vector<double>& acceleration, double sign, std::vector<double>& extra) {
+              const std::vector<double>& acceleration, double off_by, double sign,
+              std::vector<double>& extra) {
   if (!run.recorded || run.smooth_torque.empty() || !(q[2] < 0.99) || !(q[0] > 0)) return;
   using Complex = std::complex<double>;
   const double w = 2 * kPi * q[1];
@@ -102,7 +127,7 @@ void add_ring(const PreparedRun& run, const Values& q, double inertia, double si
     ie += ring.imag() * off;
   }
   // Known beforehand to be small, and nothing where there is no second inertia.
-  const double most = q[0] * w * w * kAtStart, ridge = kRingNoise * kRingNoise / (most * most);
+  const double most = q[0] * w * w * off_by, ridge = kRingNoise * kRingNoise / (most * most);
   rr += ridge;
   ii += ridge;
   const double determinant = rr * ii - ri * ri;
@@ -151,6 +176,12 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
                                .cubic_damping = term(cubic_damping_),
                                .damping = term(damping_)};
     const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
+    if (motion && h.info().state_count == 2 && in.swing != nullptr) {
+      add_swing(a, *in.swing, run.interval, sign, sum);
+      add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration,
+               in.swing->from_rest ? kAtRest : kAtStart, sign, sum);
+      continue;
+    }
     const auto at = [&](std::size_t k) {
       return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure,
                       time_of(h, run, k), k);
@@ -169,8 +200,6 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
       x = next;
       sum[k] += sign * models::effect_torque(h.effect, a.values.data(), x, memory.state());
     }
-    if (motion && h.info().state_count == 2)
-      add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration, sign, sum);
   }
   return sum;
 }

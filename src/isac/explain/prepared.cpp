@@ -174,6 +174,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
       run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
       undo_lag(run.slow_torque, smoothing.motion / dt);
       run.slow_acceleration = quiet_acceleration(run.raw_angle, smoothing.motion / dt, dt, rig.angle_step);
+      run.swing = quiet_motion(run.raw_angle, sigma, dt, rig.angle_step);
     }
   }
   // Rows beside gaps and edges see through the kernel what is not there.

@@ -68,6 +68,7 @@ struct PreparedRun {
   std::vector<double> torque;         ///< N m (or the output's unit) as read
   std::vector<double> smooth_torque;  ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
+  Motion swing;  ///< of a free joint, for what swings on it (filters.hpp, `quiet_motion`); may be empty
   std::vector<unsigned char> loaded;  ///< 0 where a force sensor hangs slack: it cannot read a push
   std::vector<unsigned char> usable;  ///< 0 beside gaps and edges
 };
