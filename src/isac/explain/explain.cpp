@@ -127,7 +127,8 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
   const double floor2 = gap.noise_floor * gap.noise_floor,
                open = gap.heldout_before * gap.heldout_before - floor2;
   constexpr double kShowing = 0.02;  // of the floor's square; less is not known so well
-  if (open > kShowing * floor2) gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
+  if (open > kShowing * floor2)
+    gap.share_closed = 1 - (gap.heldout_after * gap.heldout_after - floor2) / open;
 }
 
 /// An effect of the forces enters the torque and, where the joint is free, its motion. Where slow noise decides in one of them, and by little if it
@@ -186,9 +187,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                       free_torque_is_off(*predictor_here, found.model.model);
   if (found.wants_torque_of_free_runs || unseen) {
     if (options.progress)
-      options.progress(unseen
-                           ? "the torque of free runs is further off than that of others: it is fitted too"
-                           : "the force sensors' zero wanders: free runs tell it beside their motion");
+      options.progress(unseen ? "the torque of free runs is further off than that of others: it is fitted too"
+                              : "the force sensors' zero wanders: free runs tell it beside their motion");
     add_torque_of_free_runs(data);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data, options.threads);
