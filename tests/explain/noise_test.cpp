@@ -358,6 +358,49 @@ TEST(QuietAcceleration, carries_less_of_the_encoders_steps_and_follows_a_quick_m
   EXPECT_LT(std::abs(quick.along), 1e-3 * quick.squares);
 }
 
+// Even strokes at 1.02 steps of the encoder for each sample: the steps beat with the clock at 10 Hz, which the kernel passes.
+TEST(Beats, of_the_encoder_with_the_clock_are_hushed_within_even_strokes) {
+  const double step = 2 * kPi / 8000, interval = 0.002, sigma = 3, speed = 1.02 * step / interval;
+  std::vector<double> read, exact;
+  for (int k = 0; k < 6000; ++k) {
+    const double t = interval * k;
+    exact.push_back(speed * (2 - std::abs(std::fmod(t, 4.0) - 2)));
+    read.push_back(step * (std::floor(exact.back() / step) + 0.5));
+  }
+  std::vector<double> angle = low_pass(read, sigma), velocity = quiet_velocity(read, sigma, interval, step);
+  const std::vector<double> before = angle, rough = velocity;
+  hush_beats(read, sigma, interval, step, angle, velocity);
+  double off = 0, was_off = 0, wrong = 0, was_wrong = 0;
+  for (std::size_t k = 1; k + 1 < exact.size(); ++k) {
+    const double in_stroke = std::fmod(interval * static_cast<double>(k), 2.0),
+                 way = velocity[k] > 0 ? 1 : -1;
+    if (in_stroke < 0.7 || in_stroke > 1.3) continue;
+    off += (angle[k] - exact[k]) * (angle[k] - exact[k]);
+    was_off += (before[k] - exact[k]) * (before[k] - exact[k]);
+    wrong += (velocity[k] - way * speed) * (velocity[k] - way * speed);
+    was_wrong += (rough[k] - way * speed) * (rough[k] - way * speed);
+  }
+  EXPECT_LT(off, 0.02 * was_off);
+  EXPECT_LT(wrong, 0.02 * was_wrong);
+  for (std::size_t k = 950; k < 1050; ++k) EXPECT_EQ(angle[k], before[k]) << "at the turn";
+}
+
+TEST(Beats, are_where_the_speed_is_even_and_a_multiple_of_half_a_step_for_each_sample) {
+  const double step = 2 * kPi / 8000, interval = 0.002;
+  const auto share = [&](double steps, double swing) {
+    std::vector<double> velocity;
+    for (int k = 0; k < 3000; ++k)
+      velocity.push_back((steps + swing * std::sin(2 * kPi * interval * k)) * step / interval);
+    const std::vector<unsigned char> beats = beats_with_clock(velocity, interval, step);
+    return static_cast<double>(std::count(beats.begin(), beats.end(), 1)) / 3000;
+  };
+  for (const double steps : {0.5, 1.0, -1.02, 2.47}) EXPECT_EQ(share(steps, 0), 1.0) << steps;
+  for (const double steps : {0.0, 0.02, 0.75, -1.3}) EXPECT_EQ(share(steps, 0), 0.0) << steps;
+  EXPECT_LT(share(1.0, 2.0), 0.05) << "passed, not kept";
+  EXPECT_EQ(beats_with_clock(std::vector<double>(100, 1.0), interval, std::nan("")),
+            std::vector<unsigned char>(100, 0));
+}
+
 /// Runs of the tied rig whose pressure readings carry slow noise, felt by the torque or not.
 std::vector<series::Recording> with_slow_pressure_noise(bool felt) {
   const test::TiedRig rig;

@@ -18,31 +18,14 @@ constexpr double kStandsOut = 4.5;
 constexpr std::size_t kOfMotion = 2;  // the first ones
 constexpr const char* kVariables[] = {"angle", "velocity", "delta_pressure", "p1", "p2"};
 
-/// At an even speed near half a step for each sample, or a multiple of that, an encoder's steps beat with the clock, slowly enough to pass
-/// any kernel: the reading's error is in the residual then, and its derivative in the velocity.
-bool beats_with_clock(double velocity, double acceleration, double step, double interval) {
-  constexpr double kPassesKernel = 40, kWhile = 0.1;  // Hz, s
-  if (!(std::isfinite(step) && step > 0)) return false;
-  const double steps = velocity * interval / step;  // for each sample
-  const double nearest = 0.5 * std::round(2 * steps);
-  return nearest != 0 && std::abs(steps - nearest) < kPassesKernel * interval &&
-         std::abs(acceleration) * kWhile < kPassesKernel * step;
-}
-
-/// Velocities; not a number where the encoder's steps beat with the clock.
+/// Velocities; not a number where the encoder's steps beat with the clock: the reading's error is in the residual then, and its derivative here.
 std::vector<std::vector<double>> velocities_of(const Prepared& data) {
-  constexpr double kSmooth = 0.05;  // s
   std::vector<std::vector<double>> all;
   for (const PreparedRun& run : data.runs) {
     std::vector<double>& velocity = all.emplace_back(run.velocity);
-    if (velocity.size() < 2) continue;
-    const std::vector<double> smooth = wide_low_pass(run.velocity, kSmooth / run.interval);
-    for (std::size_t k = 0; k < velocity.size(); ++k) {
-      const std::size_t a = k - std::min<std::size_t>(k, 1), b = std::min(k + 1, velocity.size() - 1);
-      const double acceleration = (smooth[b] - smooth[a]) / (static_cast<double>(b - a) * run.interval);
-      if (beats_with_clock(smooth[k], acceleration, data.rig.angle_step, run.interval))
-        velocity[k] = std::nan("");
-    }
+    const std::vector<unsigned char> beats = beats_with_clock(velocity, run.interval, data.rig.angle_step);
+    for (std::size_t k = 0; k < velocity.size(); ++k)
+      if (beats[k] != 0) velocity[k] = std::nan("");
   }
   return all;
 }

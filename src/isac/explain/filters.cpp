@@ -196,6 +196,52 @@ std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double
   return quiet_derivative(raw_angle, sigma, kQuietKernelOfAcceleration / interval, interval, angle_step, 2);
 }
 
+std::vector<unsigned char> beats_with_clock(std::span<const double> velocity, double interval,
+                                            double angle_step) {
+  constexpr double kSmooth = 0.05;                    // s
+  constexpr double kPassesKernel = 40, kWhile = 0.1;  // Hz, s
+  std::vector<unsigned char> beats(velocity.size(), 0);
+  if (!(std::isfinite(angle_step) && angle_step > 0) || velocity.size() < 2) return beats;
+  const std::vector<double> smooth = wide_low_pass(velocity, kSmooth / interval);
+  for (std::size_t k = 0; k < beats.size(); ++k) {
+    const double steps = smooth[k] * interval / angle_step;  // for each sample
+    const double nearest = 0.5 * std::round(2 * steps);
+    if (nearest == 0 || std::abs(steps - nearest) >= kPassesKernel * interval) continue;
+    const std::size_t a = k - std::min<std::size_t>(k, 1), b = std::min(k + 1, beats.size() - 1);
+    const double acceleration = (smooth[b] - smooth[a]) / (static_cast<double>(b - a) * interval);
+    beats[k] = std::abs(acceleration) * kWhile < kPassesKernel * angle_step ? 1 : 0;
+  }
+  return beats;
+}
+
+void hush_beats(std::span<const double> raw_angle, double sigma, double interval, double angle_step,
+                std::vector<double>& angle, std::vector<double>& velocity) {
+  constexpr double kWide = 0.08, kReach = 0.45,
+                   kBlend = 0.1;  // s: kernel, what three of them see, a gentle change
+  const std::vector<unsigned char> beats = beats_with_clock(velocity, interval, angle_step);
+  const auto reach = static_cast<std::size_t>(kReach / interval);
+  std::vector<TwoWays> orders;
+  for (std::size_t begin = 0; begin < beats.size();) {
+    if (beats[begin] == 0) {
+      ++begin;
+      continue;
+    }
+    std::size_t end = begin;
+    while (end < beats.size() && beats[end] != 0) ++end;
+    const std::size_t from = begin + reach, to = end - std::min(end, reach);
+    if (orders.empty() && from < to)
+      for (int order = 0; order < 2; ++order)
+        orders.push_back(two_ways(raw_angle, sigma, kWide / interval, interval, order));
+    for (std::size_t k = from; k < to; ++k) {
+      const double inside = static_cast<double>(std::min(k - from, to - 1 - k) + 1) * interval;
+      const double share = std::min(1.0, inside / kBlend);
+      angle[k] += share * (orders[0].slow[k] - angle[k]);
+      velocity[k] += share * (orders[1].slow[k] - velocity[k]);
+    }
+    begin = end;
+  }
+}
+
 namespace {
 
 /// What is let go covers in twice the time four times the way, what moves already twice.

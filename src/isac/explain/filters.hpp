@@ -45,6 +45,13 @@ inline constexpr double kKernelReach =
 /// g″ ∗ φ by the same way: the steps are in the balance of the motion twice, where an inertia is looked for.
 [[nodiscard]] std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double sigma_samples,
                                                      double interval, double angle_step);
+/// Where the speed is even and near half a step of the encoder for each sample, or a multiple of that: there the steps beat with the clock,
+/// slowly enough to pass any kernel. (None where no step is known.)
+[[nodiscard]] std::vector<unsigned char> beats_with_clock(std::span<const double> velocity, double interval,
+                                                          double angle_step);
+/// Takes such beats out of a low-passed angle and its velocity: well within even strokes a kernel of 80 ms sees the motion as it is.
+void hush_beats(std::span<const double> raw_angle, double sigma_samples, double interval, double angle_step,
+                std::vector<double>& angle, std::vector<double>& velocity);
 /// An angle and its two derivatives, low-passed; sample `lead` is the first of the recording.
 struct Motion {
   std::vector<double> angle, velocity, acceleration;
