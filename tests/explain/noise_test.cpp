@@ -369,7 +369,7 @@ TEST(Beats, of_the_encoder_with_the_clock_are_hushed_within_even_strokes) {
   }
   std::vector<double> angle = low_pass(read, sigma), velocity = quiet_velocity(read, sigma, interval, step);
   const std::vector<double> before = angle, rough = velocity;
-  hush_beats(read, sigma, interval, step, angle, velocity);
+  hush_beats(read, interval, step, angle, velocity);
   double off = 0, was_off = 0, wrong = 0, was_wrong = 0;
   for (std::size_t k = 1; k + 1 < exact.size(); ++k) {
     const double in_stroke = std::fmod(interval * static_cast<double>(k), 2.0),

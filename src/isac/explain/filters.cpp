@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "isac/core/units.hpp"
 #include "isac/series/statistics.hpp"
@@ -214,13 +215,36 @@ std::vector<unsigned char> beats_with_clock(std::span<const double> velocity, do
   return beats;
 }
 
-void hush_beats(std::span<const double> raw_angle, double sigma, double interval, double angle_step,
+namespace {
+
+/// The parabola through x[from, to) by least squares, at sample k: its value and its slope per sample.
+std::pair<double, double> parabola(std::span<const double> x, std::size_t from, std::size_t to,
+                                   std::size_t k) {
+  const double half = 0.5 * static_cast<double>(to - from), here = static_cast<double>(k);
+  double m[5] = {}, y[3] = {};
+  for (std::size_t i = from; i < to; ++i) {
+    const double u = (static_cast<double>(i) - here) / half, v = x[i] - x[k];
+    double power = 1;
+    for (int p = 0; p < 5; ++p, power *= u) {
+      m[p] += power;
+      if (p < 3) y[p] += power * v;
+    }
+  }
+  const double c0 = m[2] * m[4] - m[3] * m[3], c1 = m[2] * m[3] - m[1] * m[4], c2 = m[1] * m[3] - m[2] * m[2];
+  const double det = m[0] * c0 + m[1] * c1 + m[2] * c2;
+  const double value = (y[0] * c0 + y[1] * c1 + y[2] * c2) / det;
+  const double slope =
+      (y[0] * c1 + y[1] * (m[0] * m[4] - m[2] * m[2]) + y[2] * (m[1] * m[2] - m[0] * m[3])) / det;
+  return {x[k] + value, slope / half};
+}
+
+}  // namespace
+
+void hush_beats(std::span<const double> raw_angle, double interval, double angle_step,
                 std::vector<double>& angle, std::vector<double>& velocity) {
-  constexpr double kWide = 0.08, kReach = 0.45,
-                   kBlend = 0.1;  // s: kernel, what three of them see, a gentle change
+  constexpr double kHalfWidth = 0.3, kBlend = 0.02;  // s
   const std::vector<unsigned char> beats = beats_with_clock(velocity, interval, angle_step);
-  const auto reach = static_cast<std::size_t>(kReach / interval);
-  std::vector<TwoWays> orders;
+  const auto width = static_cast<std::size_t>(kHalfWidth / interval);
   for (std::size_t begin = 0; begin < beats.size();) {
     if (beats[begin] == 0) {
       ++begin;
@@ -228,15 +252,13 @@ void hush_beats(std::span<const double> raw_angle, double sigma, double interval
     }
     std::size_t end = begin;
     while (end < beats.size() && beats[end] != 0) ++end;
-    const std::size_t from = begin + reach, to = end - std::min(end, reach);
-    if (orders.empty() && from < to)
-      for (int order = 0; order < 2; ++order)
-        orders.push_back(two_ways(raw_angle, sigma, kWide / interval, interval, order));
-    for (std::size_t k = from; k < to; ++k) {
-      const double inside = static_cast<double>(std::min(k - from, to - 1 - k) + 1) * interval;
+    for (std::size_t k = begin; k < end && end - begin > width; ++k) {
+      const auto [value, slope] =
+          parabola(raw_angle, k - std::min(k - begin, width), std::min(end, k + width + 1), k);
+      const double inside = static_cast<double>(std::min(k - begin, end - 1 - k) + 1) * interval;
       const double share = std::min(1.0, inside / kBlend);
-      angle[k] += share * (orders[0].slow[k] - angle[k]);
-      velocity[k] += share * (orders[1].slow[k] - velocity[k]);
+      angle[k] += share * (value - angle[k]);
+      velocity[k] += share * (slope / interval - velocity[k]);
     }
     begin = end;
   }

@@ -49,8 +49,9 @@ inline constexpr double kKernelReach =
 /// slowly enough to pass any kernel. (None where no step is known.)
 [[nodiscard]] std::vector<unsigned char> beats_with_clock(std::span<const double> velocity, double interval,
                                                           double angle_step);
-/// Takes such beats out of a low-passed angle and its velocity: well within even strokes a kernel of 80 ms sees the motion as it is.
-void hush_beats(std::span<const double> raw_angle, double sigma_samples, double interval, double angle_step,
+/// Takes such beats out of a low-passed angle and its velocity: within an even stroke a parabola through 0.6 s of it, or through as much as there is
+/// on one side, sees the motion as it is.
+void hush_beats(std::span<const double> raw_angle, double interval, double angle_step,
                 std::vector<double>& angle, std::vector<double>& velocity);
 /// An angle and its two derivatives, low-passed; sample `lead` is the first of the recording.
 struct Motion {

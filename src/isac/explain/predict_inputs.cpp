@@ -203,7 +203,7 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
     const double sigma = data_->smoothing.torque / dt;
     in.own_angle = low_pass(truth, sigma);
     in.own_velocity = quiet_velocity(truth, sigma, dt, data_->rig.angle_step * ratio);
-    hush_beats(truth, sigma, dt, data_->rig.angle_step * ratio, in.own_angle, in.own_velocity);
+    hush_beats(truth, dt, data_->rig.angle_step * ratio, in.own_angle, in.own_velocity);
     in.own_acceleration = low_pass_derivative(truth, sigma, dt, 2);
     if (slow)
       in.own_slow_acceleration =

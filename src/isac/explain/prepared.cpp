@@ -124,7 +124,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     run.angle = low_pass(run.raw_angle, sigma);
     const std::vector<double> velocity = low_pass_derivative(run.raw_angle, sigma, dt, 1);
     run.velocity = quiet_velocity(run.raw_angle, sigma, dt, rig.angle_step);
-    hush_beats(run.raw_angle, sigma, dt, rig.angle_step, run.angle, run.velocity);
+    hush_beats(run.raw_angle, dt, rig.angle_step, run.angle, run.velocity);
     run.acceleration = low_pass_derivative(run.raw_angle, sigma, dt, 2);
     run.dry_velocity = dry_velocity(run.raw_angle, velocity, dt, rig.angle_step);
   }

@@ -12,7 +12,10 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kTogether = 8;  // functions of the dictionary that are projected at once
-constexpr double kMimicked = 1e-5;    // of a response's squares left by the projection: all of it is mimicked
+// The same of an effect that was added, and of a function without a name, whose product of signals passed the kernel before it was multiplied, not after: 3 % of v p_mean beside
+// the damping of that very form held 8 sigma of the encoder's own steps.
+constexpr double kMimickedByItself = 1e-3;
+constexpr double kMimicked = 3e-5;  // of a response's squares left by the projection: all of it is mimicked
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
@@ -142,11 +145,14 @@ class Screening {
     x = place_.project_columns(x);
     Done done;
     Eigen::Index first = 0;
+    const std::vector<Active>& there = place_.fit->model.effects;
+    const bool added =
+        std::any_of(there.begin(), there.end(), [&](const Active& a) { return a.hypothesis == &h; });
     for (std::size_t s = 0; s < ways.size(); ++s) {
       const auto m = static_cast<Eigen::Index>(ways[s].size());
       std::vector<Column> of_shape;
       for (Eigen::Index a = 0; a < m; ++a) {
-        Column c = summary(x.col(first + a), raw[first + a]);
+        Column c = summary(x.col(first + a), raw[first + a], added ? kMimickedByItself : kMimicked);
         c.hypothesis = hypothesis;
         c.shape = static_cast<int>(s);
         c.amplitude = static_cast<int>(a);
@@ -179,7 +185,7 @@ class Screening {
     Done done;
     for (std::size_t d = first; d < last; ++d) {
       const auto column = static_cast<Eigen::Index>(d - first);
-      done.columns.push_back(summary(x.col(column), raw[column]));
+      done.columns.push_back(summary(x.col(column), raw[column], kMimickedByItself));
       done.columns.back().name = generic_.name(d);
       done.columns.back().chain = generic_.chain(d);
     }
@@ -219,7 +225,8 @@ class Screening {
   }
 
   /// Scores of a projected response against the residual.
-  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2) const {
+  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2,
+                 double mimicked = kMimicked) const {
     const auto atoms = static_cast<Eigen::Index>(data_.atoms);
     Column column;
     column.raw_norm2 = raw_norm2;
@@ -253,8 +260,8 @@ class Screening {
     }
     column.norm2 = column.atom_norm.sum();
     column.resting = column.norm2 > 0 ? held_by_runs / column.norm2 : 0.0;
-    // A third of a percent of a response is how its column was low-passed, not what the effect does.
-    if (column.norm2 < kMimicked * std::max(column.raw_norm2, 1e-300)) {
+    // Half a percent of a response is how its column was low-passed, not what the effect does.
+    if (column.norm2 < mimicked * std::max(column.raw_norm2, 1e-300)) {
       column.atom_score.setZero();
       column.run_error.setZero();
       column.norm2 = 0;
