@@ -123,10 +123,7 @@ class Day {
       second.push_back(which == 2 && i > 0 ? second.back() : step(second));
     }
     const Reference one = levels(first, hold), two = levels(second, hold);
-    for (int k = 0; k < rows_of(seconds); ++k) {
-      run.command_1.push_back(one(k * kRowTime));
-      run.command_2.push_back(two(k * kRowTime));
-    }
+    command_each(run, one, two, rows_of(seconds));
   }
 
   /// The order in which the runs were recorded is drawn; between two runs the rig rests 20 to 60 s.

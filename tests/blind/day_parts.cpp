@@ -83,4 +83,11 @@ void command(RunPlan& run, double delta, double mean) {
   run.command_2.push_back(std::clamp(mean + delta, 0.0, 5.0));
 }
 
+void command_each(RunPlan& run, const Reference& first, const Reference& second, int rows) {
+  for (int k = 0; k < rows; ++k) {
+    run.command_1.push_back(first(k * kRowTime));
+    run.command_2.push_back(second(k * kRowTime));
+  }
+}
+
 }  // namespace blind

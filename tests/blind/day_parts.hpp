@@ -23,6 +23,8 @@ void follow(RunPlan& run, const Reference& reference, double offset, double ampl
 double reach(const Rig& rig, double delta, double mean);
 /// Commands of one row, within 0 to 5 kg/cm2.
 void command(RunPlan& run, double delta, double mean);
+/// Each valve by itself, as the references say.
+void command_each(RunPlan& run, const Reference& first, const Reference& second, int rows);
 inline int rows_of(double seconds) {
   return static_cast<int>(seconds * kRate);
 }

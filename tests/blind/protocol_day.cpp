@@ -111,10 +111,7 @@ class ProtocolDay {
     std::vector<double> backwards;
     std::copy(table.rbegin(), table.rend(), std::back_inserter(backwards));
     const Reference one = levels(table, hold), two = levels(backwards, hold);
-    for (int k = 0; k < rows_of(seconds); ++k) {
-      run.command_1.push_back(one(k * kRowTime));
-      run.command_2.push_back(two(k * kRowTime));
-    }
+    command_each(run, one, two, rows_of(seconds));
   }
 
   const Rig& rig_;

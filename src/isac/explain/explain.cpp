@@ -259,7 +259,14 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   const bool told =
       (refuted || e.gap.heldout_after > e.gap.heldout_before) && !found.added.empty() &&
       other_reading_shows(predictor, library, found, plain, proof, chain, refuted, options, e.gap);
-  if (refuted && !told) e.verdict = Verdict::kUnknown;
+  if (refuted && !told) {
+    e.verdict = Verdict::kUnknown;
+    const std::string why =
+        fmt::format("ruled out by the held-out runs: {:.3g} {} off without it, {:.3g} with it",
+                    e.gap.heldout_before, e.gap.unit, e.gap.heldout_after);
+    e.trials.push_back({e.effects.front().id, why});
+    if (options.progress) options.progress(e.effects.front().id + ": " + why);
+  }
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);

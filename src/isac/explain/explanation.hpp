@@ -106,7 +106,9 @@ struct NextExperiment {
 
 struct Gap {
   std::string signal, unit;
-  double before = kNotKnown, after = kNotKnown, noise_floor = kNotKnown;
+  double before = kNotKnown, after = kNotKnown;
+  /// As the signal's own; where an adequate model leaves more of the fitted runs (noise that remembers), that.
+  double noise_floor = kNotKnown;
   double heldout_before = kNotKnown, heldout_after = kNotKnown;
   double heldout_zero_model = kNotKnown;  ///< rms of the signal itself: the model that says 0
   double share_closed = kNotKnown;        ///< 1 − (after² − floor²)/(before² − floor²), held-out

@@ -12,10 +12,9 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kTogether = 8;  // functions of the dictionary that are projected at once
-// The same of an effect that was added, and of a function without a name, whose product of signals passed the kernel before it was multiplied, not after: 3 % of v p_mean beside
-// the damping of that very form held 8 sigma of the encoder's own steps.
-constexpr double kMimickedByItself = 1e-3;
-constexpr double kMimicked = 3e-5;  // of a response's squares left by the projection: all of it is mimicked
+constexpr double kMimicked = 3e-5;    // of a response's squares left by the projection: all of it is mimicked
+// The same of a function without a name: less than 3 % of v p_mean, beside the damping of that very form, held T = 6 of the encoder's own steps.
+constexpr double kMimickedFunction = 1e-3;
 
 /// Values with one amplitude at its start and the others absent; all of them if there is no choice.
 std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
@@ -145,14 +144,11 @@ class Screening {
     x = place_.project_columns(x);
     Done done;
     Eigen::Index first = 0;
-    const std::vector<Active>& there = place_.fit->model.effects;
-    const bool added =
-        std::any_of(there.begin(), there.end(), [&](const Active& a) { return a.hypothesis == &h; });
     for (std::size_t s = 0; s < ways.size(); ++s) {
       const auto m = static_cast<Eigen::Index>(ways[s].size());
       std::vector<Column> of_shape;
       for (Eigen::Index a = 0; a < m; ++a) {
-        Column c = summary(x.col(first + a), raw[first + a], added ? kMimickedByItself : kMimicked);
+        Column c = summary(x.col(first + a), raw[first + a], kMimicked);
         c.hypothesis = hypothesis;
         c.shape = static_cast<int>(s);
         c.amplitude = static_cast<int>(a);
@@ -185,7 +181,7 @@ class Screening {
     Done done;
     for (std::size_t d = first; d < last; ++d) {
       const auto column = static_cast<Eigen::Index>(d - first);
-      done.columns.push_back(summary(x.col(column), raw[column], kMimickedByItself));
+      done.columns.push_back(summary(x.col(column), raw[column], kMimickedFunction));
       done.columns.back().name = generic_.name(d);
       done.columns.back().chain = generic_.chain(d);
     }
@@ -225,8 +221,7 @@ class Screening {
   }
 
   /// Scores of a projected response against the residual.
-  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2,
-                 double mimicked = kMimicked) const {
+  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2, double mimicked) const {
     const auto atoms = static_cast<Eigen::Index>(data_.atoms);
     Column column;
     column.raw_norm2 = raw_norm2;
