@@ -270,6 +270,12 @@ TEST(ChangeSentence, tells_the_change_and_what_it_had_stood_in_for) {
             "C changed its sign, from -0.00100 to 0.00200 N m s3.");
 }
 
+TEST(HowMuchWorse, says_no_sigma_where_there_is_none) {
+  EXPECT_EQ(how_much_worse(0.4), "fits only 0.40 sigma worse");
+  EXPECT_EQ(how_much_worse(4.4e-10), "fits as well");
+  EXPECT_EQ(how_much_worse(-0.2), "fits as well");
+}
+
 TEST(VariableWords, call_a_variable_by_the_word_of_its_axis) {
   EXPECT_EQ(variable_in_words("delta_pressure"), "pressure difference Δp");
   EXPECT_EQ(variable_in_words("velocity"), "speed φ̇");

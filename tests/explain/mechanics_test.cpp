@@ -8,6 +8,7 @@
 
 #include "experiment_bench.hpp"
 #include "isac/explain/generic_fit.hpp"
+#include "isac/explain/predict_parts.hpp"
 #include "isac/explain/ranking.hpp"
 
 namespace isac::explain {
@@ -243,6 +244,53 @@ TEST(Twins, both_sensors_zeros_stand_beside_a_valve_zero) {
   };
   EXPECT_TRUE(ranked(0));
   EXPECT_FALSE(ranked(1));
+}
+
+/// Two candidates that leave as much as one another, in places that have nothing to do with one another.
+std::vector<Trial> equally_good(const Bench& bench, const char* first, const char* second) {
+  std::vector<Trial> trials(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    trials[i].hypothesis =
+        static_cast<int>(bench.find(i == 0 ? first : second) - bench.library.hypotheses.data());
+    trials[i].residual = 0.5 * bench.stem.residual;
+  }
+  trials[1].residual.head(trials[1].residual.size() / 2) *= -1;
+  for (Trial& t : trials) t.loss = t.residual.squaredNorm();
+  return trials;
+}
+
+// As many numbers each: the gain of a force is no general case of its offset that has to lead to stay in the set.
+TEST(Ranking, keeps_a_gain_beside_an_offset_that_fits_as_well) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
+  const Ranking ranking(bench.data, bench.library);
+  std::vector<Trial> trials = equally_good(bench, "force_offset", "force_gain_error");
+  ranking.rank(trials, bench.stem.residual);
+  EXPECT_EQ(ranking.id_of(trials[0]), "force_offset");
+  EXPECT_TRUE(trials[1].in_set);
+  trials = equally_good(bench, "coulomb_friction", "stribeck_friction");
+  ranking.rank(trials, bench.stem.residual);
+  EXPECT_EQ(ranking.id_of(trials[0]), "coulomb_friction");
+  EXPECT_FALSE(trials[1].in_set);
+}
+
+TEST(Ranking, knows_no_rival_of_another_reading) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
+  const Ranking ranking(bench.data, bench.library);
+  std::vector<Trial> trials = equally_good(bench, "coulomb_friction", "leak");
+  EXPECT_FALSE(ranking.share_readings(trials[0], trials[1]));
+  ranking.rank(trials, bench.stem.residual);
+  EXPECT_FALSE(trials[1].in_set);
+  // A pressure sensor's zero enters both.
+  trials = equally_good(bench, "coulomb_friction", "pressure_offset");
+  EXPECT_TRUE(ranking.share_readings(trials[0], trials[1]));
+  ranking.rank(trials, bench.stem.residual);
+  EXPECT_TRUE(trials[1].in_set);
+}
+
+TEST(Growth, is_the_same_by_its_series_and_by_the_exponential) {
+  for (const double s : {1e-9, 1e-4, 0.019999, 0.020001, 0.1, 0.399, 0.401, 3.0})
+    for (const double sign : {-1.0, 1.0})
+      EXPECT_NEAR(growth(sign * s), std::expm1(sign * s) / (sign * s), 2e-11 * std::exp(s)) << sign * s;
 }
 
 TEST(Twins, two_sensors_that_err_by_the_same_have_one_cause) {

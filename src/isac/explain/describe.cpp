@@ -96,7 +96,14 @@ void add_numbers(const Predictor& predictor, const Found& found, const std::opti
   for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
     if (after.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = after.effects[i];
   if (e.effects.empty() || found.added.empty()) return;
-  const std::string stood_in_for = e.effects.empty() ? "" : e.effects.front().name;
+  // Of several effects the first that enters what the parameter does.
+  const auto stood_in_for = [&](const std::string& base) -> std::string {
+    const unsigned rows = base == "K_C" || base == "T_C" ? kPressureChains : kForceChains;
+    for (std::size_t i = 0; i < e.effects.size() && i < found.added.size(); ++i)
+      if ((found.model.model.effects[found.model.tolerances + i].hypothesis->chains & rows) != 0)
+        return e.effects[i].name;
+    return e.effects.front().name;
+  };
   for (std::size_t j = 0; j < predictor.base().size(); ++j) {
     const BaseParameter& b = predictor.base()[j];
     BaseChange change;
@@ -107,7 +114,7 @@ void add_numbers(const Predictor& predictor, const Found& found, const std::opti
     const double moved = std::abs(change.after - change.before);
     const bool beyond_error = !std::isfinite(after.base[j].std_error) || moved > after.base[j].std_error;
     if (moved > kWorthTelling * std::abs(change.before) && beyond_error)
-      change.sentence = change_sentence(change, stood_in_for);
+      change.sentence = change_sentence(change, stood_in_for(b.name));
     e.base_changes.push_back(std::move(change));
   }
 }
@@ -213,6 +220,11 @@ std::string change_sentence(const BaseChange& change, const std::string& effect)
                      100 * std::abs(ratio - 1), because);
 }
 
+std::string how_much_worse(double sigma) {
+  constexpr double kAsWell = 0.01;
+  return sigma < kAsWell ? "fits as well" : fmt::format("fits only {} sigma worse", rounded(sigma, 2));
+}
+
 std::string summary_of(const Explanation& e) {
   switch (e.verdict) {
     case Verdict::kNone:
@@ -274,8 +286,8 @@ std::string summary_of(const Explanation& e) {
           fmt::format(" {} {} it ({}), but {} cannot be ruled out{}", upper_first(joined(names)), close,
                       closing(e), joined(rivals), e.verdict == Verdict::kFamily ? ", all of one kind" : "");
       if (!e.alternatives.empty())
-        text += fmt::format(": {} fits only {} sigma worse", e.alternatives.front().name,
-                            rounded(std::max(0.0, e.alternatives.front().behind_best), 2));
+        text += fmt::format(": {} {}", e.alternatives.front().name,
+                            how_much_worse(e.alternatives.front().behind_best));
       return text + ".";
     }
   }

@@ -29,5 +29,7 @@ void add_evidence(const Predictor& predictor, const Library& library, const Foun
 [[nodiscard]] std::string summary_of(const Explanation& e);
 /// "D fell by 31 %: it had stood in for Coulomb friction."
 [[nodiscard]] std::string change_sentence(const BaseChange& change, const std::string& effect);
+/// "fits only 0.40 sigma worse", or that it fits as well.
+[[nodiscard]] std::string how_much_worse(double sigma);
 
 }  // namespace isac::explain

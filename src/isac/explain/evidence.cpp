@@ -142,7 +142,9 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
   Eigen::VectorXd weighted = left;
   weigh(data, found.weights, weighted);
   const Eigen::VectorXd gain = weighted.array().square() - found.model.residual.array().square();
-  const double sigma = std::sqrt(std::max(0.0, gain.sum()) / std::max(step.screen.noise_unit, 1e-12));
+  const double unit =
+      compare(data, found.model.residual, weighted, 0, noise_density(data, found.model.residual)).unit;
+  const double sigma = std::sqrt(std::max(0.0, gain.sum()) / std::max(unit, 1e-12));
   c.evidence.push_back(
       {true,
        fmt::format("Taken out of the final model it is missed by {} sigma; what it adds is {} times the "
@@ -169,10 +171,9 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
     const auto& rival = library.hypotheses[static_cast<std::size_t>(t.hypothesis)].info();
     if (t.in_set) {
       c.evidence.push_back(
-          {false, fmt::format("{} fits only {} sigma worse; {} sigma of data lie between them. "
-                              "What would tell: {}.",
-                              rival.term, rounded(std::max(0.0, told_behind(t.behind)), 2),
-                              rounded(t.behind.separation, 2), h.info().told_apart_by)});
+          {false, fmt::format("{} {}; {} sigma of data lie between them. What would tell: {}.", rival.term,
+                              how_much_worse(told_behind(t.behind)), rounded(t.behind.separation, 2),
+                              h.info().told_apart_by)});
       continue;
     }
     if (nests(rival.id, h.info().id)) {
@@ -201,9 +202,9 @@ void evidence_of_rival(const Predictor& predictor, const Library& library, const
   const std::string fails = where_it_fails(predictor.data(), best, *place.trial);
   if (in_set) {
     c.evidence.push_back(
-        {true, fmt::format("It fits only {} sigma worse than {}; {} sigma of data lie between their "
-                           "predictions. What would tell: {}.",
-                           rounded(std::max(0.0, told_behind(place.trial->behind)), 2), winner.term,
+        {true, fmt::format("Beside {} it {}; {} sigma of data lie between their predictions. What would "
+                           "tell: {}.",
+                           winner.term, how_much_worse(told_behind(place.trial->behind)),
                            rounded(place.trial->behind.separation, 2), own.told_apart_by)});
   } else {
     c.evidence.push_back(

@@ -154,6 +154,14 @@ bool other_reading_shows(const Predictor& predictor, const Library& library, con
   return true;
 }
 
+/// Do indexes of one library mean the same in the other?
+bool same_hypotheses(const Library& a, const Library& b) {
+  return std::equal(a.hypotheses.begin(), a.hypotheses.end(), b.hypotheses.begin(), b.hypotheses.end(),
+                    [](const Hypothesis& x, const Hypothesis& y) {
+                      return x.effect == y.effect && x.clock == y.clock && x.chains == y.chains;
+                    });
+}
+
 /// None of the catalogue: what came nearest is told as ruled out, nothing is added.
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
@@ -180,7 +188,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   QuietPressure quiet = QuietPressure::learn(data);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
   auto predictor_here = std::make_unique<Predictor>(data, options.threads);
-  const Look first{.provisional = true, .contenders = {}};
+  Look first;
+  first.provisional = true;
   Found found = search(*predictor_here, *library_here, data, options, first);
   const bool nothing = found.added.empty() && !(found.gate.significant && found.gate.material);
   const bool unseen = !found.wants_torque_of_free_runs && nothing && can_add_torque_of_free_runs(data) &&
@@ -203,8 +212,14 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data, options.threads);
     if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
-    found = search(*predictor_here, *library_here, data, options,
-                   {.provisional = false, .contenders = found.contenders});
+    Look again;
+    again.contenders = std::move(found.contenders);
+    if (same_hypotheses(*first_library, *library_here)) {
+      again.settled = std::move(found.settled);
+      again.gate = found.gate;
+      again.notes = std::move(found.notes);
+    }
+    found = search(*predictor_here, *library_here, data, options, again);
   }
   const Library& library = *library_here;
   const Predictor& predictor = *predictor_here;

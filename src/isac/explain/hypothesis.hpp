@@ -31,6 +31,11 @@ enum class SeenBy : unsigned char { kForceSensors, kMotionOnly };
 inline constexpr unsigned kPressureChains = bit(Chain::kPressure1) | bit(Chain::kPressure2);
 inline constexpr unsigned kForceChains = bit(Chain::kTorque) | bit(Chain::kMotion);
 inline constexpr unsigned kAllChains = kPressureChains | kForceChains;
+/// Forces hang together with the motion, and pressures with one another: what enters the one shows or leaves something in the other.
+[[nodiscard]] constexpr unsigned together_with(unsigned chains) noexcept {
+  return ((chains & kForceChains) != 0 ? kForceChains : 0U) |
+         ((chains & kPressureChains) != 0 ? kPressureChains : 0U);
+}
 
 struct Hypothesis {
   int effect = -1;  ///< index in the catalogue

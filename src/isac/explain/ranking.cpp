@@ -35,6 +35,13 @@ std::string Ranking::id_of(const Trial& t) const {
   return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
 }
 
+bool Ranking::share_readings(const Trial& a, const Trial& b) const {
+  const auto chains = [&](const Trial& t) {
+    return together_with(library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains);
+  };
+  return (chains(a) & chains(b)) != 0;
+}
+
 bool Ranking::is_limit_case(int hypothesis, const Values& values) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(hypothesis)];
   if (std::string_view(h.info().id) == "stribeck_friction" && values[1] < kHardlyMore * values[0])
@@ -119,8 +126,10 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
   for (Trial& t : trials)
     if (&t != &trials.front() && t.in_set)
       for (const Trial& simple : trials)
+        // (An offset and a gain of a force are as many numbers: neither is the simpler one.)
         if (simple.in_set && nests(id_of(t), id_of(simple)) && !are_two_causes_of_one(t, simple) &&
-            (t.behind.t > -kNestedDoubt || is_limit_case(t.hypothesis, t.values)))
+            ((parameters_of(t) > parameters_of(simple) && t.behind.t > -kNestedDoubt) ||
+             is_limit_case(t.hypothesis, t.values)))
           t.in_set = false;
   weigh(trials);
 }
@@ -130,7 +139,7 @@ void Ranking::mark(std::vector<Trial>& trials) const {
   const NoiseDensity noise = noise_density(data_, best.residual);
   for (Trial& t : trials) {
     t.behind = compare(data_, best.residual, t.residual, parameters_of(t) - parameters_of(best), noise);
-    t.in_set = &t == &best || cannot_rule_out(t.behind);
+    t.in_set = &t == &best || (cannot_rule_out(t.behind) && share_readings(t, best));
   }
 }
 

@@ -42,6 +42,8 @@ class Ranking {
 
   [[nodiscard]] int parameters_of(const Trial& trial) const;
   [[nodiscard]] std::string id_of(const Trial& trial) const;
+  /// Do both enter forces and motion, or pressures? What closes another reading is missing beside the first, and no rival of it.
+  [[nodiscard]] bool share_readings(const Trial& a, const Trial& b) const;
   /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none, and a
   /// friction that is hardly larger at rest is dry friction.
   [[nodiscard]] bool is_limit_case(int hypothesis, const Values& values) const;

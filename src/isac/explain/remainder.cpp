@@ -50,16 +50,18 @@ void Search::hold_against_functions() {
   if (generic.functions.empty()) return;
   std::string names;
   int parameters = 0;
+  unsigned common = kAllChains;  // readings that all of them enter: one function has only one
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const Trial& named = found_.steps[i].trials.front();
     names += (i > 0 ? " and " : "") + ranking_.id_of(named);
     // Of those beyond the first, each was the best of many as well.
     parameters += ranking_.parameters_of(named) + (i > 0 ? kChoosingOne : 0);
+    common &= together_with(chains_of(named));
   }
   const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
                                                         : baseline.project(found_.model.residual);
   const Comparison behind = behind_generic(data_, left, parameters, generic);
-  if (generic.functions.size() < found_.added.size() && behind.separation < kTwinLimit)
+  if (generic.functions.size() < found_.added.size() && common != 0 && behind.separation < kTwinLimit)
     found_.doubts.push_back(fmt::format(
         "Together they do no more than one function without a name ({:.1f} sigma of data between them): it "
         "may be one thing, and neither of them.",

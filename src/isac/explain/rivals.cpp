@@ -2,14 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "isac/explain/gate.hpp"
+#include "isac/explain/refine.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 
-bool Search::another_leaves_nothing() {
+bool Search::another_leaves_nothing(const Step& step) {
   std::vector<Trial>& trials = found_.steps.front().trials;
+  // What the first closes together with a second, a rival that leaves nothing closes alone, but for an equation's own error.
+  constexpr double kOwnError = 0.05;  // of the units that the first closed
+  double together = std::numeric_limits<double>::infinity();
+  if (!step.trials.empty()) {
+    const Trial& second = step.trials.front();
+    const double unit =
+        compare(data_, second.residual, place_.residual, 0, noise_density(data_, second.residual)).unit;
+    together = second.loss + unit * std::max(kLargeForSure, kOwnError * largest_units_);
+  }
   const Fit kept = found_.model;
   const std::string first = ranking_.id_of(trials.front());
   const double blocks = data_.block_seconds;
@@ -17,9 +29,11 @@ bool Search::another_leaves_nothing() {
   int tried = 0;
   for (std::size_t i = 1; i < trials.size() && tried < 3; ++i) {
     if (!cannot_rule_out(trials[i].behind) && !nests(ranking_.id_of(trials[i]), first)) continue;
+    if (!ranking_.share_readings(trials[i], trials.front())) continue;
     ++tried;
     found_.added.back() = trials[i].hypothesis;
     move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
+    if (place_.residual.squaredNorm() > together) continue;
     const double large = kSmallRemainder * trials[i].material;
     asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
     const Step nameless = screened_step();
@@ -49,8 +63,17 @@ bool Search::a_rival_goes_better_with(const Step& step) {
   const Trial& second = step.trials.front();
   const std::string first = ranking_.id_of(trials.front());
   const double unit = step.screen.noise_unit;
+  // The second effect was fitted beside the first: beside a rival it may be of another size, which only other starts lead to.
+  const Hypothesis& other = library_.hypotheses[static_cast<std::size_t>(second.hypothesis)];
+  std::vector<Values> starts = other.shapes;
+  starts.push_back(second.values);
   const auto loss_of = [&](const Trial& t) {
-    return with({t, second}).loss + 2 * unit * ranking_.parameters_of(t);
+    const Fit alone = with({t});
+    const Around beside = around(predictor_, alone, found_.weights);
+    std::vector<double> losses(starts.size());
+    share_work(options_.threads, starts.size(),
+               [&](std::size_t i) { losses[i] = refine(beside, other, starts[i]).loss; });
+    return *std::min_element(losses.begin(), losses.end()) + 2 * unit * ranking_.parameters_of(t);
   };
   const double standing = loss_of(trials.front());
   double least = standing - kThreeSigma * unit;
@@ -59,6 +82,7 @@ bool Search::a_rival_goes_better_with(const Step& step) {
     // A general case led its simple one because something else was missing: beside that, the simple one need only do as well.
     const bool simpler = nests(first, ranking_.id_of(trials[i]));
     if ((!cannot_rule_out(trials[i].behind) && !simpler) ||
+        !ranking_.share_readings(trials[i], trials.front()) ||
         ranking_.id_of(trials[i]) == ranking_.id_of(second))
       continue;
     ++tried;
@@ -70,6 +94,52 @@ bool Search::a_rival_goes_better_with(const Step& step) {
   if (best == 0) return false;
   say(fmt::format("{} goes better with {} than {} does: it takes its place", ranking_.id_of(trials[best]),
                   ranking_.id_of(second), first));
+  put_first(best);
+  found_.added.back() = trials.front().hypothesis;
+  move_to(with({trials.front()}));
+  return true;
+}
+
+bool Search::another_pair_closes_more(const Step& step) {
+  if (a_pair_was_tried_ || step.trials.empty()) return false;
+  a_pair_was_tried_ = true;
+  constexpr std::size_t kRivals = 2;
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const Fit kept = found_.model;
+  const double blocks = data_.block_seconds, unit = step.screen.noise_unit;
+  const std::size_t notes = found_.notes.size();
+  const std::string first = ranking_.id_of(trials.front());
+  const auto penalised = [&](double loss, const Trial& a, const Trial& b) {
+    return loss + 2 * unit * (ranking_.parameters_of(a) + ranking_.parameters_of(b));
+  };
+  double least = penalised(with({trials.front(), step.trials.front()}).loss, trials.front(), step.trials.front()) -
+                 kLargeForSure * unit;
+  std::size_t best = 0, tried = 0;
+  std::string second;
+  for (std::size_t i = 1; i < trials.size() && tried < kRivals; ++i) {
+    if (!ranking_.share_readings(trials[i], trials.front()) || trials[i].material < options_.material) continue;
+    ++tried;
+    found_.added.back() = trials[i].hypothesis;
+    move_to(with({trials[i]}));
+    asked_for_ = contenders();
+    const Step next = step_here();
+    asked_for_.reset();
+    if (next.trials.empty() || next.trials.front().material < kSecondOfFloor) continue;
+    const double loss = penalised(next.trials.front().loss, trials[i], next.trials.front());
+    if (loss >= least) continue;
+    least = loss;
+    best = i;
+    second = ranking_.id_of(next.trials.front());
+  }
+  found_.notes.resize(notes);
+  if (best == 0) {
+    found_.added.back() = trials.front().hypothesis;
+    cut_blocks(data_, blocks);
+    move_to(kept);
+    return false;
+  }
+  say(fmt::format("{} and {} close more than {} does with any other: it takes its place",
+                  ranking_.id_of(trials[best]), second, first));
   put_first(best);
   found_.added.back() = trials.front().hypothesis;
   move_to(with({trials.front()}));
@@ -95,6 +165,7 @@ void Search::swap_and_drop() {
   std::vector<Step> steps;
   bool changed = false;
   const double blocks = data_.block_seconds;
+  const Fit whole = found_.model;
   asked_for_ = contenders();
   for (std::size_t i = 0; i < chosen.size();) {
     if (!changed && i + 1 == chosen.size()) {  // beside all before it: so it was added
@@ -106,8 +177,18 @@ void Search::swap_and_drop() {
     found_.added.clear();
     for (const Trial& t : others) found_.added.push_back(t.hypothesis);
     move_to(with(others));
+    const double missed_by =
+        (found_.model.loss - whole.loss) /
+        compare(data_, whole.residual, found_.model.residual, 0, noise_density(data_, whole.residual)).unit;
     Step step = step_here();
-    if (step.trials.empty() || !step.gate.significant) {
+    const bool shows = !step.trials.empty() && step.gate.significant;
+    if (!shows && !changed && missed_by > kLargeForSure) {
+      // Beside a wrong size of the others its response is small; the joint fit says what it is worth.
+      steps.push_back(std::move(found_.steps[i]));
+      ++i;
+      continue;
+    }
+    if (!shows) {
       say(fmt::format("{} is not missed when it is dropped", ranking_.id_of(chosen[i])));
       chosen = others;
       changed = true;

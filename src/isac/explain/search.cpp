@@ -18,6 +18,7 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
+constexpr double kOwnError = 0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
@@ -44,7 +45,7 @@ Found Search::run() {
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
   if (found_.adequate && !found_.added.empty()) hold_against_itself();
   look_at_remainder();
-  if (found_.adequate) leave_half_a_step();
+  if (found_.adequate) leave_half_a_step(false);
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
   look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
@@ -79,12 +80,21 @@ std::set<std::string> Search::contenders() const {
 void Search::report(const std::vector<Trial>& trials) {
   for (const Trial& t : trials) {
     const Trial& best = trials.front();
+    // The simpler case of it that stands in its place.
+    const auto simple = std::find_if(trials.begin(), trials.end(), [&](const Trial& other) {
+      return other.in_set && nests(ranking_.id_of(t), ranking_.id_of(other));
+    });
     const std::string sentence =
         &t == &best ? fmt::format("fits best; closes {:.0f} units of noise, {:.2f} of the floor",
                                   units_closed(t), t.material)
         : t.in_set
             ? fmt::format("cannot be told from {} ({:.1f} sigma behind, {:.1f} sigma of data between them)",
                           ranking_.id_of(best), told_behind(t.behind), t.behind.separation)
+        : simple != trials.end() && cannot_rule_out(t.behind)
+            ? fmt::format("what it has beyond {} is not needed ({:.1f} sigma behind {})",
+                          ranking_.id_of(*simple), told_behind(t.behind), ranking_.id_of(best))
+        : !ranking_.share_readings(t, best)
+            ? fmt::format("closes another reading than {}: no rival of it", ranking_.id_of(best))
             : fmt::format("ruled out: {:.1f} sigma behind {}", told_behind(t.behind), ranking_.id_of(best));
     found_.notes.push_back({ranking_.id_of(t), sentence});
     say(ranking_.id_of(t) + ": " + sentence);
@@ -94,6 +104,7 @@ void Search::report(const std::vector<Trial>& trials) {
 void Search::forward() {
   first_size_ = largest_size_ = largest_units_ = 0;
   left_elsewhere_ = false;
+  take_settled();
   for (;;) {
     const bool narrow = !found_.added.empty() && !look_.contenders.empty();
     if (narrow) asked_for_ = look_.contenders;
@@ -121,11 +132,11 @@ void Search::forward() {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }
-    if (open && is_within_a_step(step) && leave_half_a_step()) {
+    if (open && is_within_a_step(step) && leave_half_a_step(true)) {
       keep_what_holds_an_offset();
       continue;
     }
-    if (open && found_.added.size() == 1 && another_leaves_nothing()) return;
+    if (open && found_.added.size() == 1 && another_leaves_nothing(step)) return;
     bool take = open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
     if (take) {
       const double size = step.trials.front().material;
@@ -138,7 +149,9 @@ void Search::forward() {
         largest_units_ = std::max(largest_units_, units_closed(step.trials.front()));
       }
     }
-    if (open && !take && found_.added.size() == 1 && a_rival_goes_better_with(step)) continue;
+    if (open && !take && found_.added.size() == 1 &&
+        (a_rival_goes_better_with(step) || another_pair_closes_more(step)))
+      continue;
     if (open && !take && !found_.added.empty()) leave_elsewhere(step);
     found_.steps.push_back(std::move(step));
     if (take) {
@@ -149,11 +162,53 @@ void Search::forward() {
     // A valve's effect was added, and it is not all that is missing.
     if (look_.provisional && touches_pressures() && (found_.added.size() > 1 || (!take && open))) {
       found_.worth_another_look = true;
+      found_.settled = settled_steps();
       found_.contenders = contenders();
       return;
     }
     if (!take) return;
   }
+}
+
+std::vector<Step> Search::settled_steps() const {
+  // Not where the noise's colour or a tolerance depended on what was found: the other look comes to them in its own order.
+  const bool tolerated =
+      std::any_of(library_.tolerances.begin(), library_.tolerances.end(), [](const Hypothesis& h) {
+        return (h.id() == "dead_time" || h.id() == "encoder_offset") && h.upper[0] > 0;
+      });
+  std::vector<Step> settled;
+  if (colour_beside_best_ || tolerated) return settled;
+  const auto elsewhere = [&](const Trial& t) { return (chains_of(t) & ~kPressureChains) != 0; };
+  for (std::size_t i = 0; i < found_.added.size(); ++i) {
+    if (elsewhere(found_.steps[i].trials.front())) break;
+    settled.push_back(found_.steps[i]);
+    std::erase_if(settled.back().trials, elsewhere);  // what closes another reading is no rival of it
+  }
+  return settled;
+}
+
+void Search::take_settled() {
+  if (look_.settled.empty()) return;
+  found_.gate = look_.gate;
+  found_.notes = look_.notes;
+  std::vector<Active> effects;
+  for (const Step& step : look_.settled) {
+    const Trial& best = step.trials.front();
+    if (effects.empty()) first_size_ = best.material;
+    largest_size_ = std::max(largest_size_, best.material);
+    largest_units_ = std::max(largest_units_, step.units);
+    found_.added.push_back(best.hypothesis);
+    found_.steps.push_back(step);
+    effects.push_back(active_of(best));
+    // What was tried changed nothing in the rows of forces and motion, whose noise is another now.
+    for (Trial& t : found_.steps.back().trials) {
+      for (std::size_t i = 0; i < data_.rows.size(); ++i)
+        if ((bit(data_.rows[i].chain) & kForceChains) != 0)
+          t.residual[static_cast<Eigen::Index>(i)] = place_.residual[static_cast<Eigen::Index>(i)];
+      t.loss = t.residual.squaredNorm();
+    }
+  }
+  move_to(refit(predictor_, found_.model, effects, found_.weights, 6));
 }
 
 void Search::leave_elsewhere(const Step& step) {
@@ -174,12 +229,9 @@ bool Search::is_open(const Step& step) const {
 }
 
 bool Search::leaves_over_in(unsigned chains) const {
-  const auto together = [](unsigned c) {
-    return ((c & kForceChains) != 0 ? kForceChains : 0U) |
-           ((c & kPressureChains) != 0 ? kPressureChains : 0U);
-  };
   return std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
-    return (together(library_.hypotheses[static_cast<std::size_t>(h)].chains) & together(chains)) != 0;
+    return (together_with(library_.hypotheses[static_cast<std::size_t>(h)].chains) & together_with(chains)) !=
+           0;
   });
 }
 
@@ -285,7 +337,7 @@ void Search::keep_what_holds_an_offset() {
   }
 }
 
-bool Search::leave_half_a_step() {
+bool Search::leave_half_a_step(bool asked_for) {
   if (found_.added.empty() || !std::isfinite(data_.rig.angle_step) || !data_.baseline.terms.empty())
     return false;
   std::vector<Active> effects(
@@ -299,9 +351,20 @@ bool Search::leave_half_a_step() {
       std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
                   [](const Hypothesis& h) { return h.id() == "encoder_offset" && h.upper[0] > 0; });
   if (an_offset || there || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return false;
-  tolerate(library_, data_, "encoder_offset", -0.5 * data_.rig.angle_step, 0.5 * data_.rig.angle_step);
-  found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
-  move_to(refit(predictor_, found_.baseline, effects, found_.weights, 8));
+  const double half = 0.5 * data_.rig.angle_step, without = found_.model.loss;
+  const auto within = [&](double low, double high) {
+    tolerate(library_, data_, "encoder_offset", low, high);
+    found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+    return refit(predictor_, found_.baseline, effects, found_.weights, 8);
+  };
+  Fit fit = within(-half, half);
+  const double unit = compare(data_, fit.residual, fit.residual, 0, noise_density(data_, fit.residual)).unit;
+  // Hardly told, or by no more than an equation's own error: the middle of the step is all one knows.
+  if (!asked_for && without - fit.loss < std::max(kLargeForSure, kOwnError * largest_units_) * unit) {
+    fit = within(0, 0);
+    tolerate(library_, data_, "encoder_offset", -half, half);
+  }
+  move_to(fit);
   return true;
 }
 

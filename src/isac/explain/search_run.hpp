@@ -56,6 +56,10 @@ class Search {
   std::set<std::string> contenders() const;
   void report(const std::vector<Trial>& trials);
   void forward();
+  /// Steps that a second look, at the torque's pressures, need not take again: what was added, and its rivals, enters rows of the pressures only.
+  std::vector<Step> settled_steps() const;
+  /// Goes on after the steps that an earlier look settled.
+  void take_settled();
   bool is_open(const Step& step) const;
   /// Beside a wrong share of the first, a second effect shows little until both are refitted.
   bool is_worth_a_second_name(const Step& step) const;
@@ -91,8 +95,9 @@ class Search {
   /// one that does not and an offset. It stays in the set.
   void keep_what_holds_an_offset();
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
-  /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.)
-  bool leave_half_a_step();
+  /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.) It stays in the middle of the step unless
+  /// the runs tell more, or a remainder `asked_for` it.
+  bool leave_half_a_step(bool asked_for);
 
   // One step: search_step.cpp.
   void choose_blocks(const Eigen::VectorXd& residual);
@@ -141,10 +146,13 @@ class Search {
 
   // What may take an effect's place: rivals.cpp.
   /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
-  bool another_leaves_nothing();
+  bool another_leaves_nothing(const Step& step);
   /// The effect that stood first leaves too little for a second name and too much for none: one of its rivals, which fitted nearly as well
   /// alone, may fit better with that second one, and leave it larger. It takes the place of the first.
   bool a_rival_goes_better_with(const Step& step);
+  /// One effect may look like two at once (a gain of a pressure sensor like a leak and an offset): of the first effect's rivals that alone close
+  /// less, one that closes more together with a second takes its place.
+  bool another_pair_closes_more(const Step& step);
   /// Of the first step's trials this one is taken; what stood first is ruled out.
   void put_first(std::size_t i);
   /// Each effect is given up once, with the others in place: another may do better, or nothing may be missed.
@@ -179,7 +187,7 @@ class Search {
       0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
   double largest_units_ = 0;     ///< of noise that one of them closed
   bool left_elsewhere_ = false;  ///< and told so
-  bool a_rival_was_tried_ = false;
+  bool a_rival_was_tried_ = false, a_pair_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
 
