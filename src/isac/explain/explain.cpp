@@ -217,6 +217,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     if (same_hypotheses(*first_library, *library_here)) {
       again.settled = std::move(found.settled);
       again.gate = found.gate;
+      again.weights = found.weights;
+      again.colour_beside_best = found.colour_beside_best;
       again.notes = std::move(found.notes);
     }
     found = search(*predictor_here, *library_here, data, options, again);

@@ -20,7 +20,8 @@ bool Search::another_leaves_nothing(const Step& step) {
     const Trial& second = step.trials.front();
     const double unit =
         compare(data_, second.residual, place_.residual, 0, noise_density(data_, second.residual)).unit;
-    together = second.loss + unit * std::max(kLargeForSure, kOwnError * largest_units_);
+    const bool same_rows = ranking_.share_readings(second, trials.front());
+    together = second.loss + unit * std::max(kLargeForSure, same_rows ? kOwnError * largest_units_ : 0.0);
   }
   const Fit kept = found_.model;
   const std::string first = ranking_.id_of(trials.front());
@@ -112,12 +113,14 @@ bool Search::another_pair_closes_more(const Step& step) {
   const auto penalised = [&](double loss, const Trial& a, const Trial& b) {
     return loss + 2 * unit * (ranking_.parameters_of(a) + ranking_.parameters_of(b));
   };
-  double least = penalised(with({trials.front(), step.trials.front()}).loss, trials.front(), step.trials.front()) -
-                 kLargeForSure * unit;
+  double least =
+      penalised(with({trials.front(), step.trials.front()}).loss, trials.front(), step.trials.front()) -
+      kLargeForSure * unit;
   std::size_t best = 0, tried = 0;
   std::string second;
   for (std::size_t i = 1; i < trials.size() && tried < kRivals; ++i) {
-    if (!ranking_.share_readings(trials[i], trials.front()) || trials[i].material < options_.material) continue;
+    if (!ranking_.share_readings(trials[i], trials.front()) || trials[i].material < options_.material)
+      continue;
     ++tried;
     found_.added.back() = trials[i].hypothesis;
     move_to(with({trials[i]}));

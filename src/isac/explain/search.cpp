@@ -18,7 +18,8 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
-constexpr double kOwnError = 0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
+constexpr double kOwnError =
+    0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
@@ -163,6 +164,7 @@ void Search::forward() {
     if (look_.provisional && touches_pressures() && (found_.added.size() > 1 || (!take && open))) {
       found_.worth_another_look = true;
       found_.settled = settled_steps();
+      found_.colour_beside_best = colour_beside_best_;
       found_.contenders = contenders();
       return;
     }
@@ -171,13 +173,13 @@ void Search::forward() {
 }
 
 std::vector<Step> Search::settled_steps() const {
-  // Not where the noise's colour or a tolerance depended on what was found: the other look comes to them in its own order.
+  // Not where a tolerance depended on what was found: the other look comes to it in its own order.
   const bool tolerated =
       std::any_of(library_.tolerances.begin(), library_.tolerances.end(), [](const Hypothesis& h) {
         return (h.id() == "dead_time" || h.id() == "encoder_offset") && h.upper[0] > 0;
       });
   std::vector<Step> settled;
-  if (colour_beside_best_ || tolerated) return settled;
+  if (tolerated) return settled;
   const auto elsewhere = [&](const Trial& t) { return (chains_of(t) & ~kPressureChains) != 0; };
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     if (elsewhere(found_.steps[i].trials.front())) break;
@@ -198,17 +200,23 @@ void Search::take_settled() {
     largest_size_ = std::max(largest_size_, best.material);
     largest_units_ = std::max(largest_units_, step.units);
     found_.added.push_back(best.hypothesis);
-    found_.steps.push_back(step);
     effects.push_back(active_of(best));
-    // What was tried changed nothing in the rows of forces and motion, whose noise is another now.
-    for (Trial& t : found_.steps.back().trials) {
+  }
+  found_.steps = look_.settled;
+  if (look_.colour_beside_best) {
+    colour_beside_best_ = true;
+    const Fit with_them = refit(predictor_, found_.baseline, effects, found_.weights, 6);
+    take_colour(unfiltered(data_, found_.weights, with_them.residual));
+  }
+  // What was tried changed nothing in the rows of forces and motion, whose noise is another now.
+  for (Step& step : found_.steps)
+    for (Trial& t : step.trials) {
       for (std::size_t i = 0; i < data_.rows.size(); ++i)
         if ((bit(data_.rows[i].chain) & kForceChains) != 0)
           t.residual[static_cast<Eigen::Index>(i)] = place_.residual[static_cast<Eigen::Index>(i)];
       t.loss = t.residual.squaredNorm();
     }
-  }
-  move_to(refit(predictor_, found_.model, effects, found_.weights, 6));
+  move_to(refit(predictor_, found_.baseline, effects, found_.weights, 6));
 }
 
 void Search::leave_elsewhere(const Step& step) {
@@ -359,8 +367,12 @@ bool Search::leave_half_a_step(bool asked_for) {
   };
   Fit fit = within(-half, half);
   const double unit = compare(data_, fit.residual, fit.residual, 0, noise_density(data_, fit.residual)).unit;
+  double closed = 0;  // units of noise, by the largest of what enters the same rows
+  for (std::size_t i = 0; i < std::min(found_.added.size(), found_.steps.size()); ++i)
+    if ((library_.hypotheses[static_cast<std::size_t>(found_.added[i])].chains & kForceChains) != 0)
+      closed = std::max(closed, found_.steps[i].units);
   // Hardly told, or by no more than an equation's own error: the middle of the step is all one knows.
-  if (!asked_for && without - fit.loss < std::max(kLargeForSure, kOwnError * largest_units_) * unit) {
+  if (!asked_for && without - fit.loss < std::max(kLargeForSure, kOwnError * closed) * unit) {
     fit = within(0, 0);
     tolerate(library_, data_, "encoder_offset", -half, half);
   }

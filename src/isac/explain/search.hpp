@@ -40,7 +40,8 @@ struct Found {
   std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
   bool worth_another_look = false;
-  std::vector<Step> settled;  ///< then: steps of the pressures' own rows, which that changes nothing of
+  bool colour_beside_best = false;  ///< the noise's colour was read off beside an effect
+  std::vector<Step> settled;        ///< then: steps of the pressures' own rows, which that changes nothing of
   /// Ended at its beginning: the force sensors' zero wanders, so the torque of free runs is wanted beside their motion (prepared.hpp).
   bool wants_torque_of_free_runs = false;
   std::set<std::string> contenders;  ///< then: ids of what stood near the top of any screen
@@ -54,7 +55,9 @@ struct Look {
   std::set<std::string> contenders;
   std::vector<Step> settled;  ///< its steps that need not be taken again; of a library of the same hypotheses
   Gate gate;                  ///< of the baseline, where steps are settled
-  std::vector<TrialNote> notes;  ///< what was said up to them
+  Weights weights;            ///< of that look, whose colour of the pressures stands
+  bool colour_beside_best = false;  ///< its noise's colour was read off beside what it found
+  std::vector<TrialNote> notes;     ///< what was said up to them
 };
 
 /// `library` gains shapes that only the baseline's residual can tell.

@@ -54,7 +54,13 @@ void Search::move_to(const Fit& fit) {
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
   take_colours(data_, beside_generic_functions(data_, left_over), found_.weights);
-  found_.wants_torque_of_free_runs = found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0 &&
+  if (!look_.settled.empty()) {  // the pressures' own has been read off already
+    for (const Chain c : {Chain::kPressure1, Chain::kPressure2})
+      found_.weights.colour[static_cast<int>(c)] = look_.weights.colour[static_cast<int>(c)];
+    found_.weights.take(data_);
+  }
+  found_.wants_torque_of_free_runs = look_.provisional &&
+                                     found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0 &&
                                      can_add_torque_of_free_runs(data_);
   responses_.forget();
   found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
