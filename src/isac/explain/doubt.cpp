@@ -146,6 +146,18 @@ void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
   if (!left.depends_on.empty()) e.unknown = std::move(left);
 }
 
+namespace {
+
+/// The sentence that goes with it; empty where no signal tells.
+std::string tell_signal(const std::string& variable, const BaselineModel& baseline, Explanation& e) {
+  if (variable.empty()) return "";
+  e.unknown->depends_on = {variable};
+  return fmt::format(" Most of it goes with {}.",
+                     variable_in_words(variable, of_linear_axis(axis_unit("rad", baseline))));
+}
+
+}  // namespace
+
 void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Proof& proof, Explanation& e) {
   constexpr double kFarOff =
       1.35;  // noise that begins anew with every run made it 1.22 at most in 96 datasets without an effect
@@ -169,8 +181,9 @@ void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Pro
       e.summary = fmt::format(
           "Nothing is missing on the fitted runs, but on the held-out ones the {} is {:.3g} {} off, {:.2g} "
           "times as far: something is missing that the fitted runs do not excite. Put one of those runs "
-          "among them.",
-          s.signal, s.heldout, s.unit, s.heldout / s.rmse);
+          "among them.{}",
+          s.signal, s.heldout, s.unit, s.heldout / s.rmse,
+          tell_signal(proof.signal_that_tells(found.model.model, found.weights, chain), data.baseline, e));
       return;
     }
 }
@@ -188,7 +201,8 @@ void leave_unknown(Chain chain, const Label& label, Explanation& e) {
 
 }  // namespace
 
-void look_at_slow_noise(const Prepared& data, const Found& found, double material, Explanation& e) {
+void look_at_slow_noise(const Predictor& predictor, const Found& found, double material, Explanation& e) {
+  const Prepared& data = predictor.data();
   constexpr double kMostRange = 1.5;  // 1.21 at most in 150 datasets of a zero that does wander
   constexpr double kFarMore = 8;      // 2.5 at most in 18 datasets of three kinds of noise
   if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
@@ -215,13 +229,16 @@ void look_at_slow_noise(const Prepared& data, const Found& found, double materia
     if (e.gap.signal == s.signal) e.gap.noise_floor = s.noise_floor;
     e.summary = fmt::format(
         "What is left of the {} moves from second to second {}. Something slow is missing, and neither an "
-        "effect of the catalogue nor a function of the signals fits it.",
-        label.signal, why);
+        "effect of the catalogue nor a function of the signals fits it.{}",
+        label.signal, why,
+        tell_signal(signal_that_tells(around(predictor, found.model, found.weights), Chain::kTorque),
+                    data.baseline, e));
     return;
   }
 }
 
-void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
+void look_at_moments(const Predictor& predictor, const Found& found, Explanation& e) {
+  const Prepared& data = predictor.data();
   if (e.verdict != Verdict::kNone && e.verdict != Verdict::kImmaterial) return;
   const Moments moments = moments_of(data, found.model.residual);
   if (!moments.stand_out()) return;
@@ -232,9 +249,11 @@ void look_at_moments(const Prepared& data, const Found& found, Explanation& e) {
       "the mean square is {:.0f} times the "
       "usual one: something is missing that shows only there, and neither an effect of the catalogue nor a "
       "function of the signals fits it. "
-      "Look at those moments.",
+      "Look at those moments.{}",
       label.signal == "motion" ? "balance of the free joint's motion" : label.signal, moments.time,
-      data.runs[moments.run].name, moments.times_usual);
+      data.runs[moments.run].name, moments.times_usual,
+      tell_signal(signal_that_tells(around(predictor, found.model, found.weights), moments.chain),
+                  data.baseline, e));
 }
 
 void look_at_curves(const Prepared& data, const Found& found, const ExplainOptions& options, Explanation& e) {

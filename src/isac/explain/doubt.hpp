@@ -43,10 +43,10 @@ void look_beyond_fitted_runs(const Prepared& data, const Found& found, const Pro
 
 /// What passes for slow noise, and would wander by more than the readings hold or moves one run far more than the others, is unknown and not
 /// nothing.
-void look_at_slow_noise(const Prepared& data, const Found& found, double material, Explanation& e);
+void look_at_slow_noise(const Predictor& predictor, const Found& found, double material, Explanation& e);
 
 /// What shows in a few moments only, and fits no name and no function of the signals, is unknown and not nothing.
-void look_at_moments(const Prepared& data, const Found& found, Explanation& e);
+void look_at_moments(const Predictor& predictor, const Found& found, Explanation& e);
 
 /// What depends on one signal by a curve that no name and no function is like is unknown, and not nothing.
 void look_at_curves(const Prepared& data, const Found& found, const ExplainOptions& options, Explanation& e);

@@ -315,8 +315,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (!moment.empty() && e.verdict != Verdict::kUnknown) e.summary += " " + moment;
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
-  look_at_slow_noise(data, found, options.material, e);
-  look_at_moments(data, found, e);
+  look_at_slow_noise(predictor, found, options.material, e);
+  look_at_moments(predictor, found, e);
   look_at_curves(data, found, options, e);
   return e;
 }

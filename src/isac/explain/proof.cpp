@@ -6,6 +6,7 @@
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/unknown.hpp"
 
 namespace isac::explain {
 namespace {
@@ -171,21 +172,32 @@ Sums Proof::residual(const ModelPoint& model, Chain chain) const {
   return predictor_ ? raw_residual(*predictor_, moved_here(model), chain) : Sums{};
 }
 
+Eigen::VectorXd Proof::weighted_residual(const ModelPoint& model, const Weights& weights) const {
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_->rows()));
+  predictor_->predict(moved_here(model), kAllChains, rows);
+  rows -= predictor_->measured();
+  weigh(*data_, weights, rows);
+  for (double& r : rows)
+    if (!std::isfinite(r)) r = 0;
+  return rows;
+}
+
 Proof::Freed Proof::freed(const ModelPoint& first, const ModelPoint& second, const Weights& weights,
                           Chain chain) const {
   if (!predictor_) return {};
-  const auto left = [&](const ModelPoint& model) {
-    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor_->rows()));
-    predictor_->predict(moved_here(model), kAllChains, rows);
-    rows -= predictor_->measured();
-    weigh(*data_, weights, rows);
-    for (double& r : rows)
-      if (!std::isfinite(r)) r = 0;
-    return rows;
-  };
-  const Eigen::VectorXd a = left(first), b = left(second);
+  const Eigen::VectorXd a = weighted_residual(first, weights), b = weighted_residual(second, weights);
   return {compare(*data_, a, b, 0, noise_density(*data_, a)), weighted_rms(*data_, weights, a, chain),
           weighted_rms(*data_, weights, b, chain)};
+}
+
+std::string Proof::signal_that_tells(const ModelPoint& model, const Weights& weights, Chain chain) const {
+  if (!predictor_) return "";
+  Around place;  // nothing is refitted here
+  place.predictor = &*predictor_;
+  place.weights = &weights;
+  place.residual = weighted_residual(model, weights);
+  place.basis.resize(place.residual.size(), 0);
+  return explain::signal_that_tells(place, chain);
 }
 
 std::vector<Series> Proof::series(const ModelPoint& model, Chain chain) const {

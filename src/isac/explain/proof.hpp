@@ -59,6 +59,9 @@ class Proof {
   };
   [[nodiscard]] Freed freed(const ModelPoint& first, const ModelPoint& second, const Weights& weights,
                             Chain chain) const;
+  /// Of what the model leaves here (unknown.hpp); empty: no signal tells it.
+  [[nodiscard]] std::string signal_that_tells(const ModelPoint& model, const Weights& weights,
+                                              Chain chain) const;
   /// measured − predicted of each run, for what shows at the recording's rate only.
   [[nodiscard]] std::vector<Series> series(const ModelPoint& model, Chain chain) const;
   [[nodiscard]] std::vector<RunTrace> traces(const ModelPoint& before, const ModelPoint& after, Chain chain,
@@ -67,6 +70,8 @@ class Proof {
  private:
   /// The model without what belongs to the fitted runs alone.
   [[nodiscard]] ModelPoint moved_here(const ModelPoint& model) const;
+  /// Of all rows; 0 where nothing is predicted.
+  [[nodiscard]] Eigen::VectorXd weighted_residual(const ModelPoint& model, const Weights& weights) const;
 
   std::optional<Prepared> data_;
   std::optional<Predictor> predictor_;

@@ -39,32 +39,31 @@ const std::string& signal_of(const std::string& variable) {
   return variable == "direction" ? kVelocity : variable;
 }
 
-/// Powers of one muscle's pressure, and what bends where it passes shares of its range.
-StandingOut functions_of_muscle(const Around& place, Chain chain, std::size_t muscle) {
+/// Powers of one signal, and what bends where it passes shares of its range.
+StandingOut functions_of(const Around& place, Chain chain, const std::string& variable) {
   const Prepared& data = place.predictor->data();
-  double low = 1e300, high = -1e300;
-  for (const PreparedRun& run : data.runs)
-    for (const double p : run.pressure[muscle]) {
-      if (!std::isfinite(p)) continue;
-      low = std::min(low, p);
-      high = std::max(high, p);
-    }
   StandingOut out{.chain = chain, .functions = {}};
+  std::vector<double> x(data.rows.size(), kNotKnown);
+  double low = 1e300, high = -1e300;
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const Row& row = data.rows[i];
+    if (row.chain == chain) x[i] = abscissa(data.runs[row.run], row.sample, variable);
+    if (!std::isfinite(x[i])) continue;
+    low = std::min(low, x[i]);
+    high = std::max(high, x[i]);
+  }
   const auto add = [&](const std::function<double(double)>& value) {
     Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
-    for (std::size_t i = 0; i < data.rows.size(); ++i) {
-      const Row& row = data.rows[i];
-      const std::vector<double>& pressure = data.runs[row.run].pressure[muscle];
-      if (row.chain == chain && row.sample < pressure.size() && std::isfinite(pressure[row.sample]))
-        rows[static_cast<Eigen::Index>(i)] = value((pressure[row.sample] - low) / (high - low));
-    }
+    for (std::size_t i = 0; i < data.rows.size(); ++i)
+      if (std::isfinite(x[i])) rows[static_cast<Eigen::Index>(i)] = value((x[i] - low) / (high - low));
     weigh(data, *place.weights, rows);
     out.functions.push_back({out.functions.size(), place.project(rows)});
   };
   if (!(high > low)) return out;
-  for (const double power : {1.0, 2.0, 3.0, 4.0}) add([power](double p) { return std::pow(p, power); });
+  for (const double power : {1.0, 2.0, 3.0, 4.0})
+    add([power](double share) { return std::pow(share, power); });
   for (const double bend : {0.2, 0.35, 0.5, 0.65, 0.8})
-    add([bend](double p) { return std::max(0.0, p - bend); });
+    add([bend](double share) { return std::max(0.0, share - bend); });
   return out;
 }
 
@@ -78,7 +77,8 @@ void tell_muscle(const Around& place, const GenericFit& fit, double noise_unit,
   const double needed = (variables.size() > 1 ? kNearlyAll : 1 / kNearlyAll) * fit.gain;
   double gain[2];
   for (const std::size_t muscle : {0U, 1U})
-    gain[muscle] = fit_generic(place, functions_of_muscle(place, fit.chain, muscle), noise_unit).gain;
+    gain[muscle] =
+        fit_generic(place, functions_of(place, fit.chain, muscle == 0 ? "p1" : "p2"), noise_unit).gain;
   const std::size_t better = gain[1] > gain[0] ? 1 : 0;
   if (gain[better] < needed || gain[1 - better] > kNearlyAll * gain[better]) return;
   variables = {better == 0 ? "p1" : "p2"};
@@ -137,6 +137,26 @@ void add_time(Unknown& unknown) {
   if (std::find(on.begin(), on.end(), "time") == on.end())
     on.insert(std::upper_bound(on.begin(), on.end(), "time"), "time");
   std::erase(unknown.independent, "time");
+}
+
+std::string signal_that_tells(const Around& place, Chain chain) {
+  constexpr double kSome = 0.1;  // of all that is left, noise included
+  if (chain != Chain::kTorque && chain != Chain::kMotion) return "";
+  const Prepared& data = place.predictor->data();
+  double squares = 0;
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (const double r = place.residual[static_cast<Eigen::Index>(i)]; data.rows[i].chain == chain)
+      squares += r * r;
+  std::string best;
+  double most = 0, second = 0;
+  for (const char* variable : {"angle", "velocity", "delta_pressure", "mean_pressure", "p1", "p2"}) {
+    const double gain = fit_generic(place, functions_of(place, chain, variable), 1.0).gain;
+    second = std::max(second, std::min(gain, most));
+    if (gain <= most) continue;
+    most = gain;
+    best = variable;
+  }
+  return most > kSome * squares && second < kNearlyAll * most ? best : "";
 }
 
 Unknown describe_unknown(const Around& place, const Screen& screen) {

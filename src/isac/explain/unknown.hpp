@@ -9,6 +9,8 @@
 /// Units: those of Unknown. Threads: pure. Errors: none. Source: docs/derivations/explain.md.
 #pragma once
 
+#include <string>
+
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/screen.hpp"
 
@@ -16,6 +18,10 @@ namespace isac::explain {
 
 /// What comes and goes depends on time, though no function of it tells when.
 void add_time(Unknown& unknown);
+
+/// Of what shows only in few moments or in one run: the one signal that powers and bends of it tell most of, clearly more than of any other;
+/// empty where there is none.
+[[nodiscard]] std::string signal_that_tells(const Around& baseline, Chain chain);
 
 [[nodiscard]] Unknown describe_unknown(const Around& baseline, const Screen& screen);
 
