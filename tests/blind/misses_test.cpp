@@ -99,6 +99,8 @@ INSTANTIATE_TEST_SUITE_P(
              "perhaps unknown, for half a step of the encoder took the difference of its directions"},
         Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
              "nothing, for no function of the angle has fifteen waves"},
+        Miss{"leave-one-out", "coloured", "encoder_slip", "6201", R"("verdict":"not_separable")",
+             "a drift of the encoder, for nothing asked whether it happened at once"},
         Miss{"leave-one-out", "coloured", "threshold_pressure", "5901", R"("verdict":"unknown")",
              "nothing, for it passed for a zero that would wander by more than the readings hold"},
         Miss{"leave-one-out", "coloured", "second_order_lag", "5901", R"("verdict":"not_separable")",

@@ -8,6 +8,7 @@
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/slip_moment.hpp"
 
 namespace isac::explain {
 namespace {
@@ -42,7 +43,51 @@ bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo
   return names(a, b.id) || names(b, a.id);
 }
 
+/// Of all steps between two runs the one that takes most from the torque.
+GenericFit best_step_between_runs(const Around& place) {
+  const Prepared& data = place.predictor->data();
+  GenericFit best{.chain = Chain::kTorque, .functions = {}, .gain = 0, .residual = place.residual};
+  for (std::size_t first = 1; first < data.runs.size(); ++first) {
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+    for (std::size_t i = 0; i < data.rows.size(); ++i)
+      if (data.rows[i].chain == Chain::kTorque && data.rows[i].run >= first)
+        rows[static_cast<Eigen::Index>(i)] = 1;
+    weigh(data, *place.weights, rows);
+    rows = place.project(rows);
+    const double norm = rows.norm(), score = norm > 1e-6 ? rows.dot(place.residual) / norm : 0;
+    if (score * score <= best.gain) continue;
+    best.gain = score * score;
+    best.functions = {first};
+    best.residual = place.residual - rows * (score / norm);
+  }
+  return best;
+}
+
 }  // namespace
+
+void Search::hold_against_a_step() {
+  if (found_.added.size() != 1) return;
+  const Trial& named = found_.steps.front().trials.front();
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(named.hypothesis)];
+  if (h.clock != Clock::kDay || is_slip(h) || !data_.has(Chain::kTorque)) return;
+  const GenericFit step = best_step_between_runs(around(predictor_, found_.baseline, found_.weights));
+  if (step.functions.empty()) return;
+  const Comparison behind = behind_generic(data_, named.residual, ranking_.parameters_of(named), step);
+  say(fmt::format("{}: a step between two runs is {:.1f} sigma {} ({:.1f} sigma of data between them)",
+                  h.id(), std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
+  if (behind.separation < kTwinLimit || behind.t <= kCloserThanChance - 0.5 * behind.separation) return;
+  if (behind.t >= kBeaten) {
+    found_.notes.push_back(
+        {h.id(), fmt::format("ruled out: {:.1f} sigma behind a step between two runs", behind.t)});
+    found_.adequate = false;
+    return;
+  }
+  found_.doubts.push_back(fmt::format(
+      "It may have happened at once: a step before {} does as well, or nearly ({:.1f} sigma {}, where {:.1f} "
+      "sigma of data lie between).",
+      data_.runs[step.functions.front()].name, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind",
+      behind.separation));
+}
 
 void Search::hold_against_functions() {
   const Around baseline = around(predictor_, found_.baseline, found_.weights);

@@ -44,6 +44,7 @@ Found Search::run() {
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
   if (found_.added.size() > 1) swap_and_drop();
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
+  if (found_.adequate && !found_.added.empty()) hold_against_a_step();
   if (found_.adequate && !found_.added.empty()) hold_against_itself();
   look_at_remainder();
   if (found_.adequate) leave_half_a_step(false);

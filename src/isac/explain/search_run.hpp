@@ -161,6 +161,8 @@ class Search {
   // What casts doubt on a name: remainder.cpp.
   /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
   void hold_against_functions();
+  /// What moves with the time of the day may have happened at once, between two runs.
+  void hold_against_a_step();
   /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
   void hold_against_itself();
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
