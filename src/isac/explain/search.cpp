@@ -181,11 +181,15 @@ std::vector<Step> Search::settled_steps() const {
       });
   std::vector<Step> settled;
   if (tolerated) return settled;
-  const auto elsewhere = [&](const Trial& t) { return (chains_of(t) & ~kPressureChains) != 0; };
+  const auto enters_forces = [&](const Trial& t) { return (chains_of(t) & kForceChains) != 0; };
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
-    if (elsewhere(found_.steps[i].trials.front())) break;
+    const std::vector<Trial>& trials = found_.steps[i].trials;
+    // A pressure sensor's error enters both: beside it nothing is settled.
+    if (std::any_of(trials.begin(), trials.end(),
+                    [&](const Trial& t) { return t.in_set && enters_forces(t); }))
+      break;
     settled.push_back(found_.steps[i]);
-    std::erase_if(settled.back().trials, elsewhere);  // what closes another reading is no rival of it
+    std::erase_if(settled.back().trials, enters_forces);
   }
   return settled;
 }
