@@ -165,22 +165,27 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   return test;
 }
 
-double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after) {
+double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
+                  const Eigen::VectorXd& error_of_means) {
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
   Eigen::VectorXd left = Eigen::VectorXd::Zero(blocks), norm2 = Eigen::VectorXd::Zero(blocks);
   std::vector<Eigen::Index> run_of_block(data.blocks, 0);
+  Eigen::VectorXd run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.runs.size()));
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i), block = static_cast<Eigen::Index>(data.rows[i].block);
     const double closed = before[row] - after[row];
     norm2[block] += closed * closed;
     left[block] += after[row] * closed;
     run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
+    if (error_of_means.size() > 0)
+      run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * error_of_means[row];
   }
   if (!(norm2.sum() > 0)) return 1;
   const double score = norm2.sum() + left.sum();
   const Jackknife of = jackknife(left, norm2);
   if (!(of.carried_by > 2) || !(of.scatter > 0)) return 1;
-  const double p = series::student_t_two_sided(std::abs(score) / of.scatter, of.carried_by - 1);
+  const double scatter = std::hypot(of.scatter, run_error.norm());
+  const double p = series::student_t_two_sided(std::abs(score) / scatter, of.carried_by - 1);
   return std::max(
       p,
       p_by_runs(score, left, norm2, run_of_block, static_cast<Eigen::Index>(data.runs.size())).value_or(0));

@@ -126,7 +126,7 @@ class Screening {
         generic_(data_),
         kept_(kept),
         stretches_(stretches_of(data_)),
-        error_of_means_(error_of_means()) {}
+        error_of_means_(error_of_means(place)) {}
 
   std::size_t functions() const { return generic_.size(); }
 
@@ -190,17 +190,6 @@ class Screening {
 
  private:
   Eigen::Index rows() const { return static_cast<Eigen::Index>(data_.rows.size()); }
-
-  /// Weighted torque that an error of one deviation in a run's mean pressure makes, all runs side by side.
-  Eigen::VectorXd error_of_means() const {
-    Eigen::VectorXd torque = Eigen::VectorXd::Zero(rows());
-    const double gain = place_.predictor->pressure_gain(place_.fit->model);
-    for (std::size_t i = 0; i < data_.rows.size(); ++i)
-      if (data_.rows[i].chain == Chain::kTorque)
-        torque[static_cast<Eigen::Index>(i)] = gain * data_.runs[data_.rows[i].run].mean_pressure_error;
-    if (torque.squaredNorm() > 0) weigh(data_, *place_.weights, torque);
-    return torque;
-  }
 
   /// Weighted responses to every way, side by side.
   Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, const std::vector<std::vector<Values>>& ways,
@@ -357,9 +346,23 @@ Eigen::MatrixXf& Responses::effect(int hypothesis) {
   return effects_[static_cast<std::size_t>(hypothesis)];
 }
 
-Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses& kept, int hypothesis,
-                           const Eigen::VectorXd& before, const Eigen::VectorXd& residual) {
-  Yardstick yardstick{.hypothesis = hypothesis, .functions = {}, .own_p = p_of_refit(data, before, residual)};
+Eigen::VectorXd error_of_means(const Around& place) {
+  const Prepared& data = place.predictor->data();
+  Eigen::VectorXd torque = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+  const double gain = place.predictor->pressure_gain(place.fit->model);
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (data.rows[i].chain == Chain::kTorque)
+      torque[static_cast<Eigen::Index>(i)] = gain * data.runs[data.rows[i].run].mean_pressure_error;
+  if (torque.squaredNorm() > 0) weigh(data, *place.weights, torque);
+  return torque;
+}
+
+Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept, int hypothesis,
+                           const Eigen::VectorXd& residual) {
+  const Prepared& data = place.predictor->data();
+  Yardstick yardstick{.hypothesis = hypothesis,
+                      .functions = {},
+                      .own_p = p_of_refit(data, place.residual, residual, error_of_means(place))};
   std::size_t function = 0;
   for (const Column& known : screen.columns) {
     if (known.hypothesis >= 0) continue;

@@ -125,19 +125,20 @@ struct Yardstick {
   double own_p =
       1;  ///< of what its refit closes, by what that leaves in the few blocks that carry it; p_of_refit
 };
-/// `residual`: of the hypothesis' refit, `before`: what it started from; `kept` holds the functions.
-[[nodiscard]] Yardstick yardstick_beside(const Screen& screen, const Prepared& data, Responses& kept,
-                                         int hypothesis, const Eigen::VectorXd& before,
-                                         const Eigen::VectorXd& residual);
+/// `residual`: of the hypothesis' refit; `place`: what it started from; `kept` holds the functions.
+[[nodiscard]] Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept,
+                                         int hypothesis, const Eigen::VectorXd& residual);
+/// Weighted torque that an error of one deviation in a run's mean pressure makes, all runs side by side.
+[[nodiscard]] Eigen::VectorXd error_of_means(const Around& place);
 /// p-value of what one refit closes, by the scatter of what it leaves. With δ = before − after, n_b = Σ_b δ², l_b = Σ_b after·δ:
 ///
 ///   t = (Σ n_b + Σ l_b)/√Σ (l_b/(1 − h_b))²,  h_b = n_b/Σ n,  with as many degrees of freedom as blocks carry δ, less one;
-///   whole runs instead of blocks, where those scatter more
+///   whole runs instead of blocks, where those scatter more; `error_of_means` of each run adds (Σ_run δ e)² to the scatter's square
 ///
 /// A column by itself takes for scatter what an effect's other amplitudes make of it: an unbalanced mass of 270 sigma, m g l sin(φ + φ₀) of free
 /// runs only, had p = 0.04.
 [[nodiscard]] double p_of_refit(const Prepared& data, const Eigen::VectorXd& before,
-                                const Eigen::VectorXd& after);
+                                const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means = {});
 /// The tests once more, after the blocks were cut anew, or with another yardstick for one hypothesis.
 void judge(Screen& screen, const Prepared& data, const Library& library, const ScreenOptions& options,
            const Yardstick& yardstick = {});

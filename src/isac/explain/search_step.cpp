@@ -129,7 +129,7 @@ Screen Search::screen_here() {
   }
   if (large_and_not_found) {
     judge(s, data_, library_, screen_options(),
-          yardstick_beside(s, data_, responses_, first.hypothesis, place_.residual, best.front().residual));
+          yardstick_beside(s, place_, responses_, first.hypothesis, best.front().residual));
   } else if (data_.block_seconds < before) {
     judge(s, data_, library_, screen_options());
   }
