@@ -432,6 +432,7 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                                               {"force_offset", "torque_offset"},
                                               {"pressure_offset", "torque_offset"},
                                               {"force_gain_error", "force_offset"},
+                                              {"force_gain_error", "torque_offset"},
                                               {"lever_arm_variation", "quadratic_pressure_angle"},
                                               {"stribeck_friction", "bearing_friction"},
                                               {"hysteresis", "bearing_friction"},

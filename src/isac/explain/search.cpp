@@ -49,6 +49,8 @@ Found Search::run() {
   look_at_remainder();
   if (found_.adequate) leave_half_a_step(false);
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
+  if (untold_half_step_ > 0)  // it stayed in the middle, and the intervals know how far it may be off
+    tolerate(library_, data_, "encoder_offset", -untold_half_step_, untold_half_step_);
   look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
   return std::move(found_);
@@ -372,14 +374,14 @@ bool Search::leave_half_a_step(bool asked_for) {
   };
   Fit fit = within(-half, half);
   const double unit = compare(data_, fit.residual, fit.residual, 0, noise_density(data_, fit.residual)).unit;
-  double closed = 0;  // units of noise, by the largest of what enters the same rows
+  // A name that holds an offset of its own may ask for this one with its equation's error.
+  double own_error = 0;  // units of noise
   for (std::size_t i = 0; i < std::min(found_.added.size(), found_.steps.size()); ++i)
-    if ((library_.hypotheses[static_cast<std::size_t>(found_.added[i])].chains & kForceChains) != 0)
-      closed = std::max(closed, found_.steps[i].units);
-  // Hardly told, or by no more than an equation's own error: the middle of the step is all one knows.
-  if (!asked_for && without - fit.loss < std::max(kLargeForSure, kOwnError * closed) * unit) {
+    if (nests(library_.hypotheses[static_cast<std::size_t>(found_.added[i])].id(), "torque_offset"))
+      own_error = std::max(own_error, kOwnError * found_.steps[i].units);
+  if (!asked_for && without - fit.loss < std::max(kLargeForSure, own_error) * unit) {  // hardly told
     fit = within(0, 0);
-    tolerate(library_, data_, "encoder_offset", -half, half);
+    untold_half_step_ = half;
   }
   move_to(fit);
   return true;

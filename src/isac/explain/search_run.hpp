@@ -189,6 +189,7 @@ class Search {
       0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right
   double largest_units_ = 0;     ///< of noise that one of them closed
   bool left_elsewhere_ = false;  ///< and told so
+  double untold_half_step_ = 0;  ///< rad: of the encoder, which no run tells
   bool a_rival_was_tried_ = false, a_pair_was_tried_ = false;
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };

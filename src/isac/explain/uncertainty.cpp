@@ -65,6 +65,34 @@ Independent independent_of(const Eigen::MatrixXd& x) {
   return out;
 }
 
+/// How the encoder is read within its step: known to lie within bounds, alike anywhere, and not more where no run tells.
+bool is_reading_within_a_step(const Fit& fit, int effect) {
+  return effect >= 0 && effect < static_cast<int>(fit.tolerances) &&
+         fit.model.effects[static_cast<std::size_t>(effect)].hypothesis->id() == "encoder_offset";
+}
+
+/// Variances that such readings add to the coefficients of `x`: (∂β/∂τ)² v, ∂β/∂τ = −(xᵀx)⁻¹ xᵀs, 1/v = 12/range² + ‖s⊥‖²/(mean square), of the
+/// first alone where it was held.
+Eigen::VectorXd variance_by_readings(const Predictor& predictor, const Fit& fit, const Weights& weights,
+                                     const Eigen::MatrixXd& x, double mean_square) {
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(x.cols());
+  for (std::size_t i = 0; i < fit.tolerances; ++i) {
+    const Hypothesis& h = *fit.model.effects[i].hypothesis;
+    const double range = h.upper[0] - h.lower[0];
+    if (!is_reading_within_a_step(fit, static_cast<int>(i)) || !(range > 0)) continue;
+    Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
+    predictor.predict(fit.model, kAllChains, here);
+    const Eigen::VectorXd s = response(predictor, fit, here, {&h, {0.5 * range}}, weights) / (0.5 * range);
+    if (!s.allFinite()) continue;
+    const Eigen::VectorXd a = estimate::solve_symmetric(x.transpose() * x, x.transpose() * s);
+    // Held in the middle, it was not asked of the runs.
+    const bool held = fit.model.effects[i].values[0] == 0.5 * (h.lower[0] + h.upper[0]);
+    const double told = held ? 0.0 : (s - x * a).squaredNorm() / mean_square;
+    variance += a.cwiseAbs2() / (12 / (range * range) + told);
+  }
+  return variance;
+}
+
 }  // namespace
 
 Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weights& weights) {
@@ -102,6 +130,7 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
   };
   for (Eigen::Index j = 0; j < slopes.cols(); ++j) {
     const Coordinate& c = used[static_cast<std::size_t>(j)];
+    if (is_reading_within_a_step(fit, c.effect)) continue;
     Estimated* of_effect = effect_parameter(c);
     // A leak that can only be a leak and would rather be none takes no freedom from the others.
     const bool at_its_end = of_effect != nullptr && (fit.value(c) <= c.lower || fit.value(c) >= c.upper);
@@ -140,6 +169,8 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
     from = to;
   }
   const estimate::BlockCovariance v = estimate::block_covariance(blocks);
+  const Eigen::VectorXd by_readings = variance_by_readings(
+      predictor, fit, weights, x, residual.squaredNorm() / static_cast<double>(residual.size()));
   const auto coordinate = [&](Eigen::Index column) -> const Coordinate& {
     return used[static_cast<std::size_t>(columns[static_cast<std::size_t>(column)])];
   };
@@ -153,7 +184,7 @@ Uncertain uncertainties(const Predictor& predictor, const Fit& fit, const Weight
     const auto at = static_cast<std::size_t>(told.kept[static_cast<std::size_t>(j)]);
     const Coordinate& c = coordinate(told.kept[static_cast<std::size_t>(j)]);
     if (c.tolerance) continue;
-    const double error = std::sqrt(v.covariance(j, j)) * c.scale / norm[at],
+    const double error = std::sqrt(v.covariance(j, j) + by_readings[j]) * c.scale / norm[at],
                  degrees = v.degrees_of_freedom[j];
     if (c.base >= 0) {
       const auto b = static_cast<std::size_t>(c.base);

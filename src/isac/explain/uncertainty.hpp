@@ -4,7 +4,8 @@
 ///   V = H⁻¹ (Σ_b ũ_b ũ_bᵀ) H⁻¹,  H = JᵀJ,  u_b = Σ_{i∈b} J_i r_i   (CR2, Student's t by Bell and McCaffrey)
 ///
 /// J holds the sensitivities of all that was fitted, tolerances and resting angles among them, so an error contains what the
-/// data cannot tell of these. A number at its bound has no error (NaN).
+/// data cannot tell of these. How an encoder is read within its step is no free number: it lies within its bounds, alike anywhere, and
+/// adds (∂β/∂τ)² range²/12 where no run tells more. A number at its bound has no error (NaN).
 /// Units: reporting units. Threads: pure. Errors: none; a singular H gives NaN.
 /// Source: estimate/block_covariance.hpp; docs/derivations/explain.md.
 #pragma once
