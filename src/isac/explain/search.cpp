@@ -163,8 +163,10 @@ void Search::forward() {
       found_.added.push_back(best.hypothesis);
       move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
     }
-    // A valve's effect was added, and it is not all that is missing.
-    if (look_.provisional && touches_pressures() && (found_.added.size() > 1 || (!take && open))) {
+    // A valve's effect was added, and it is not all that is missing, or made the torque look as if a zero wandered.
+    const bool wanders = found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0;
+    if (look_.provisional && touches_pressures() &&
+        (found_.added.size() > 1 || (!take && (open || wanders)))) {
       found_.worth_another_look = true;
       found_.settled = settled_steps();
       found_.colour_beside_best = colour_beside_best_;
