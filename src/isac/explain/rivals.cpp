@@ -34,7 +34,10 @@ bool Search::another_leaves_nothing(const Step& step) {
     ++tried;
     found_.added.back() = trials[i].hypothesis;
     move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
-    if (place_.residual.squaredNorm() > together) continue;
+    // (Where that second name is the rival itself, the first may only take up what its equation leaves.)
+    const bool itself =
+        !step.trials.empty() && ranking_.id_of(step.trials.front()) == ranking_.id_of(trials[i]);
+    if (!itself && place_.residual.squaredNorm() > together) continue;
     const double large = kSmallRemainder * trials[i].material;
     asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
     const Step nameless = screened_step();
