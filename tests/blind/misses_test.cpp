@@ -10,6 +10,19 @@
 
 namespace {
 
+constexpr const char* kLacking =
+    "noise of real recordings is drawn from the folder that ISAC_REAL_DATA names";
+
+bool lacks_recordings(const std::string& noise) {
+  return noise == "real" && std::getenv("ISAC_REAL_DATA") == nullptr;
+}
+
+/// A path of this process alone.
+std::string scratch(const std::string& name) {
+  return (std::filesystem::temp_directory_path() / ("isac-" + name + "-" + std::to_string(getpid())))
+      .string();
+}
+
 struct Miss {
   const char *tier, *noise, *effect, *seed, *answer, *was, *day = "drawn";
 };
@@ -22,11 +35,8 @@ class Misses : public ::testing::TestWithParam<Miss> {};
 
 TEST_P(Misses, are_answered_rightly) {
   const Miss& miss = GetParam();
-  if (std::string(miss.noise) == "real" && std::getenv("ISAC_REAL_DATA") == nullptr)
-    GTEST_SKIP() << "noise of real recordings is drawn from the folder that ISAC_REAL_DATA names";
-  const std::string bin = ISAC_BIN_DIR, results = (std::filesystem::temp_directory_path() /
-                                                   ("isac-misses-" + std::to_string(getpid()) + ".jsonl"))
-                                                      .string();
+  if (lacks_recordings(miss.noise)) GTEST_SKIP() << kLacking;
+  const std::string bin = ISAC_BIN_DIR, results = scratch("misses") + ".jsonl";
   const std::string call = bin + "/blind_run --tier " + miss.tier + " --noise " + miss.noise + " --effect " +
                            miss.effect + " --seed " + miss.seed + " --day " + miss.day + " --results " +
                            results + " --explain " + bin + "/isac-explain > /dev/null 2>&1";
@@ -97,6 +107,10 @@ INSTANTIATE_TEST_SUITE_P(
              "unknown, for even strokes let the encoder's steps beat with the clock", "protocol"},
         Miss{"clear", "coloured", "asymmetric_hysteresis", "6201", R"("verdict":"named")",
              "perhaps unknown, for half a step of the encoder took the difference of its directions"},
+        Miss{"outside", "white", "bent_muscle_gain", "7001", R"("depends_on":["p2"])",
+             "unknown without a signal, for it shows in one run only", "protocol"},
+        Miss{"outside", "coloured", "bent_muscle_gain", "7001", R"("depends_on":["p2"])",
+             "unknown without a signal, for it shows on held-out runs only", "protocol"},
         Miss{"leave-one-out", "coloured", "torque_ripple", "5101", R"("verdict":"unknown")",
              "nothing, for no function of the angle has fifteen waves"},
         Miss{"leave-one-out", "coloured", "encoder_slip", "6201", R"("verdict":"not_separable")",
@@ -130,11 +144,8 @@ class PairMisses : public ::testing::TestWithParam<PairMiss> {};
 
 TEST_P(PairMisses, are_answered_rightly) {
   const PairMiss& miss = GetParam();
-  if (std::string(miss.noise) == "real" && std::getenv("ISAC_REAL_DATA") == nullptr)
-    GTEST_SKIP() << "noise of real recordings is drawn from the folder that ISAC_REAL_DATA names";
-  const std::string bin = ISAC_BIN_DIR,
-                    day = (std::filesystem::temp_directory_path() / ("isac-pair-" + std::to_string(getpid())))
-                              .string();
+  if (lacks_recordings(miss.noise)) GTEST_SKIP() << kLacking;
+  const std::string bin = ISAC_BIN_DIR, day = scratch("pair");
   const std::string call = bin + "/blind_generate --out " + day + " --label " + day + ".label --seed " +
                            miss.seed + " --noise " + miss.noise + " --effect " + miss.effects +
                            " --ratio 0.75 > /dev/null && " + bin + "/isac-explain " + day + " --json " + day +
@@ -185,10 +196,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 /// What isac-explain says, its words one space apart, of a clear slip in white noise; `without`: held-out runs that are not handed to it.
 std::string said_of_slip(const std::string& seed, const std::string& without = "") {
-  const std::string bin = ISAC_BIN_DIR,
-                    day = (std::filesystem::temp_directory_path() / ("isac-slip-" + std::to_string(getpid())))
-                              .string(),
-                    answer = day + ".txt";
+  const std::string bin = ISAC_BIN_DIR, day = scratch("slip"), answer = day + ".txt";
   const std::string call = bin + "/blind_generate --out " + day + " --label " + day + ".json --seed " + seed +
                            " --noise white --effect encoder_slip --ratio 0.75 > /dev/null && cd " + day +
                            "/heldout && rm -f none " + without + " && " + bin + "/isac-explain " + day +

@@ -34,6 +34,21 @@ double error_of(const std::vector<Estimated>& parameters, const std::string& nam
   return kNotKnown;
 }
 
+// A torque of any size within A r² half a step is how the encoder may be read: T_0 has that error too, of a value alike anywhere.
+TEST(Uncertainty, of_a_torque_contains_how_the_encoder_is_read_within_its_step) {
+  Day day(test::TiedRig{.offset = 0.02}, 100);
+  const double half = 0.5 * day.data.rig.angle_step, r = day.data.rig.wheel_radius;
+  tolerate(day.library, day.data, "encoder_offset", 0, 0);
+  const Fit stem = fit_baseline(day.predictor, day.library.tolerances, day.weights);
+  const Fit fit = refit(day.predictor, stem, {{&day.hypothesis("torque_offset"), {0.02}}}, day.weights, 12);
+  const double noise = uncertainties(day.predictor, fit, day.weights).effects[0][0].std_error;
+  tolerate(day.library, day.data, "encoder_offset", -half, half);
+  const Uncertain within = uncertainties(day.predictor, fit, day.weights);
+  const double reading = std::abs(fit.model.base[0]) * r * r * half / std::sqrt(3.0);
+  EXPECT_GT(reading, 3 * noise);
+  EXPECT_NEAR(within.effects[0][0].std_error, std::hypot(noise, reading), 0.05 * reading);
+}
+
 TEST(Uncertainty, of_a_leak_is_as_if_the_muscle_that_would_rather_gain_air_were_not_asked) {
   test::TiedRig rig;
   rig.leak[1] = 0.012;

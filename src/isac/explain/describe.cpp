@@ -96,12 +96,12 @@ void add_numbers(const Predictor& predictor, const Found& found, const std::opti
   for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
     if (after.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = after.effects[i];
   if (e.effects.empty() || found.added.empty()) return;
-  // Of several effects the first that enters what the parameter does.
-  const auto stood_in_for = [&](const std::string& base) -> std::string {
-    const unsigned rows = base == "K_C" || base == "T_C" ? kPressureChains : kForceChains;
-    for (std::size_t i = 0; i < e.effects.size() && i < found.added.size(); ++i)
-      if ((found.model.model.effects[found.model.tolerances + i].hypothesis->chains & rows) != 0)
-        return e.effects[i].name;
+  // Of several effects the first that enters the rows which the parameter enters.
+  const auto stood_in_for = [&](const BaseParameter& base) -> std::string {
+    for (std::size_t i = 0; i < e.effects.size() && i < found.added.size(); ++i) {
+      const Hypothesis& h = *found.model.model.effects[found.model.tolerances + i].hypothesis;
+      if ((h.chains & together_with(base.chains)) != 0) return e.effects[i].name;
+    }
     return e.effects.front().name;
   };
   for (std::size_t j = 0; j < predictor.base().size(); ++j) {
@@ -114,7 +114,7 @@ void add_numbers(const Predictor& predictor, const Found& found, const std::opti
     const double moved = std::abs(change.after - change.before);
     const bool beyond_error = !std::isfinite(after.base[j].std_error) || moved > after.base[j].std_error;
     if (moved > kWorthTelling * std::abs(change.before) && beyond_error)
-      change.sentence = change_sentence(change, stood_in_for(b.name));
+      change.sentence = change_sentence(change, stood_in_for(b));
     e.base_changes.push_back(std::move(change));
   }
 }

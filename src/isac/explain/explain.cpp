@@ -158,7 +158,8 @@ bool other_reading_shows(const Predictor& predictor, const Library& library, con
 bool same_hypotheses(const Library& a, const Library& b) {
   return std::equal(a.hypotheses.begin(), a.hypotheses.end(), b.hypotheses.begin(), b.hypotheses.end(),
                     [](const Hypothesis& x, const Hypothesis& y) {
-                      return x.effect == y.effect && x.clock == y.clock && x.chains == y.chains;
+                      return x.effect == y.effect && x.clock == y.clock && x.seen_by == y.seen_by &&
+                             x.chains == y.chains;
                     });
 }
 
