@@ -18,6 +18,7 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
+constexpr double kToldApart = 4;  // units of noise, two sigma
 constexpr double kOwnError =
     0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
@@ -377,11 +378,11 @@ bool Search::leave_half_a_step(bool asked_for) {
   Fit fit = within(-half, half);
   const double unit = compare(data_, fit.residual, fit.residual, 0, noise_density(data_, fit.residual)).unit;
   // A name that holds an offset of its own may ask for this one with its equation's error.
-  double own_error = 0;  // units of noise
+  double least = kToldApart;  // units of noise
   for (std::size_t i = 0; i < std::min(found_.added.size(), found_.steps.size()); ++i)
     if (nests(library_.hypotheses[static_cast<std::size_t>(found_.added[i])].id(), "torque_offset"))
-      own_error = std::max(own_error, kOwnError * found_.steps[i].units);
-  if (!asked_for && without - fit.loss < std::max(kLargeForSure, own_error) * unit) {  // hardly told
+      least = std::max({least, kLargeForSure, kOwnError * found_.steps[i].units});
+  if (!asked_for && without - fit.loss < least * unit) {  // hardly told
     fit = within(0, 0);
     untold_half_step_ = half;
   }
