@@ -192,7 +192,17 @@ INSTANTIATE_TEST_SUITE_P(
                                "supply_droop,second_order_lag",
                                "4799870686073286928",
                                {"supply_droop", "second_order_lag"},
-                               "a lag that would leave nothing, where a second name closed as much again"}));
+                               "a lag that would leave nothing, where a second name closed as much again"},
+                      PairMiss{"white",
+                               "crosstalk,leak",
+                               "6545960618622170671",
+                               {"crosstalk", "leak"},
+                               "unknown, for they go against each other and leave little of either"},
+                      PairMiss{"white",
+                               "force_offset,threshold_pressure",
+                               "6197528918744606754",
+                               {"force_offset", "threshold_pressure"},
+                               "a threshold alone, beside a zero that had seemed to wander"}));
 
 /// What isac-explain says, its words one space apart, of a clear slip in white noise; `without`: held-out runs that are not handed to it.
 std::string said_of_slip(const std::string& seed, const std::string& without = "") {

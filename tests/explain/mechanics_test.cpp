@@ -10,6 +10,7 @@
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/predict_parts.hpp"
 #include "isac/explain/ranking.hpp"
+#include "prepared_day.hpp"
 
 namespace isac::explain {
 namespace {
@@ -44,6 +45,20 @@ TEST(EncoderPlay, of_little_more_than_a_step_comes_back) {
   const Fitted play = fitted(bench, "encoder_play");
   EXPECT_NEAR(play.values[0], rig.encoder_play, 0.08 * rig.encoder_play);
   EXPECT_GT(play.gain, fitted(bench, "coulomb_friction").gain + 100);  // ten sigma
+}
+
+// A leak of both alike is a valve unit of another gain and lag: wherever noise would put it, what one leaks more than the other is that one's.
+TEST(Leak, of_one_muscle_is_not_told_as_one_of_both) {
+  TiedRig rig;
+  rig.leak[0] = 0.012;
+  for (std::uint32_t first = 100; first < 160; first += 10) {
+    const test::PreparedDay day(rig, {test::clamped(30, 0.1, 0.5, 12), test::clamped(30, -0.2, 0.8, 9)}, 4.0,
+                                first);
+    const Around place = around(day.predictor, day.baseline, day.weights);
+    const Refined leak = refine(place, day.hypothesis("leak_per_muscle"), {0.03, 0.02});
+    EXPECT_NEAR(leak.values[0], rig.leak[0], 0.1 * rig.leak[0]) << first;
+    EXPECT_EQ(leak.values[1], 0) << first;
+  }
 }
 
 TEST(Compliance, within_the_known_inertia_comes_back_although_nobody_saw_its_far_side_begin) {

@@ -219,15 +219,15 @@ std::vector<std::string> Dictionary::variables(std::size_t column) const {
   return functions()[column % functions().size()].variables;
 }
 
-Eigen::VectorXd Dictionary::rows(std::size_t column) const {
-  const auto& value = functions()[column % functions().size()].value;
-  const Scaled& top = signals_->top;
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_->rows.size()));
-  for (std::size_t i = 0; i < data_->rows.size(); ++i) {
-    const Row& row = data_->rows[i];
-    if (row.chain != chain(column)) continue;
-    const PreparedRun& run = data_->runs[row.run];
-    const Signals::Extra& e = signals_->extra[row.run];
+/// The signals of one row, scaled.
+struct Dictionary::At {
+  const Prepared& data;
+  const Signals& signals;
+
+  Scaled operator()(const Row& row) const {
+    const PreparedRun& run = data.runs[row.run];
+    const Signals::Extra& e = signals.extra[row.run];
+    const Scaled& top = signals.top;
     const std::size_t k = row.sample;
     Scaled s{};
     if (!run.angle.empty()) {
@@ -242,37 +242,63 @@ Eigen::VectorXd Dictionary::rows(std::size_t column) const {
       const bool own = row.chain == Chain::kPressure1 || row.chain == Chain::kPressure2;
       const auto &p = own ? e.asked : run.pressure, &rate = own ? e.asked_rate : e.rate;
       s.dp = 0.5 * (p[1][k] - p[0][k]) / top.dp;
-      s.p0 = (0.5 * (p[1][k] + p[0][k]) - data_->rig.initial_pressure) / top.p0;
+      s.p0 = (0.5 * (p[1][k] + p[0][k]) - data.rig.initial_pressure) / top.p0;
       s.rate1 = rate[0][k] / top.rate1;
       s.rate2 = rate[1][k] / top.rate2;
     }
     s.time = run.time[k] / top.time;
     s.day = (run.day_offset + run.time[k]) / top.day;
-    const double v = value(s);
+    return s;
+  }
+};
+
+Eigen::VectorXd Dictionary::rows(std::size_t column) const {
+  const auto& value = functions()[column % functions().size()].value;
+  const At at{*data_, *signals_};
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_->rows.size()));
+  for (std::size_t i = 0; i < data_->rows.size(); ++i) {
+    const Row& row = data_->rows[i];
+    if (row.chain != chain(column)) continue;
+    const double v = value(at(row));
     out[static_cast<Eigen::Index>(i)] = std::isfinite(v) ? v : 0.0;
   }
   return out;
 }
 
-Eigen::VectorXd beside_generic_functions(const Prepared& data, const Eigen::VectorXd& residual) {
-  Eigen::VectorXd left = residual;
+Eigen::MatrixXd Dictionary::rows_of(Chain chain, std::vector<Eigen::Index>& of) const {
+  of.clear();
+  for (std::size_t i = 0; i < data_->rows.size(); ++i)
+    if (data_->rows[i].chain == chain) of.push_back(static_cast<Eigen::Index>(i));
+  const At at{*data_, *signals_};
+  Eigen::MatrixXd x(static_cast<Eigen::Index>(of.size()), static_cast<Eigen::Index>(functions().size()));
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    const Scaled s = at(data_->rows[static_cast<std::size_t>(of[static_cast<std::size_t>(i)])]);
+    for (Eigen::Index c = 0; c < x.cols(); ++c) {
+      const double v = functions()[static_cast<std::size_t>(c)].value(s);
+      x(i, c) = std::isfinite(v) ? v : 0.0;
+    }
+  }
+  return x;
+}
+
+GenericFunctions::GenericFunctions(const Prepared& data) {
   const Dictionary generic(data);
   for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
-    std::vector<Eigen::Index> at;
-    for (std::size_t i = 0; i < data.rows.size(); ++i)
-      if (data.rows[i].chain == chain) at.push_back(static_cast<Eigen::Index>(i));
-    std::vector<std::size_t> columns;
-    for (std::size_t c = 0; c < generic.size(); ++c)
-      if (generic.chain(c) == chain) columns.push_back(c);
-    if (at.size() < 20 * columns.size() || columns.empty()) continue;
-    Eigen::MatrixXd x(static_cast<Eigen::Index>(at.size()), static_cast<Eigen::Index>(columns.size()));
-    for (std::size_t c = 0; c < columns.size(); ++c)
-      x.col(static_cast<Eigen::Index>(c)) = generic.rows(columns[c])(at);
+    if (!data.has(chain)) continue;
+    OfChain of;
+    of.x = generic.rows_of(chain, of.at);
+    if (of.x.rows() < 20 * of.x.cols()) continue;
+    of.gram = of.x.transpose() * of.x;
     // Nearly dependent functions, and those that the data does not move, must not blow up.
-    Eigen::MatrixXd gram = x.transpose() * x;
-    for (Eigen::Index c = 0; c < gram.cols(); ++c) gram(c, c) = gram(c, c) * (1 + 1e-6) + 1e-9;
-    left(at) -= x * estimate::solve_symmetric(gram, x.transpose() * residual(at));
+    for (Eigen::Index c = 0; c < of.gram.cols(); ++c) of.gram(c, c) = of.gram(c, c) * (1 + 1e-6) + 1e-9;
+    chains_.push_back(std::move(of));
   }
+}
+
+Eigen::VectorXd GenericFunctions::beside(const Eigen::VectorXd& residual) const {
+  Eigen::VectorXd left = residual;
+  for (const OfChain& of : chains_)
+    left(of.at) -= of.x * estimate::solve_symmetric(of.gram, of.x.transpose() * residual(of.at));
   return left;
 }
 

@@ -220,6 +220,9 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       again.gate = found.gate;
       again.weights = found.weights;
       again.colour_beside_best = found.colour_beside_best;
+      for (std::size_t i = 0; i < found.added.size(); ++i)
+        again.found.emplace_back(found.added[i],
+                                 found.model.model.effects[found.model.tolerances + i].values);
       again.notes = std::move(found.notes);
     }
     found = search(*predictor_here, *library_here, data, options, again);

@@ -216,7 +216,8 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run, Rea
     double z[models::kMaxEffectStates] = {};
     const bool memory = h.info().state_count > 0, clips = !h.amplitude[0];
     if (clips != (which == Reading::kClipped)) continue;
-    double last[2] = {0, 0};
+    constexpr double kNudge = 1.0;  // N
+    double last[2] = {0, 0}, held[2] = {0, 0}, rising[2] = {0, 0};
     for (std::size_t k = 0; k < torque.size(); ++k) {
       models::Readings<double> y;
       const double load = (torque[k] + change[k]) / r;
@@ -237,14 +238,19 @@ void Predictor::read_forces(const ModelPoint& model, const PreparedRun& run, Rea
           // mean of the two no lag came out shorter than half a sample.)
           models::Readings<double> from = y;
           for (int i = 0; i < 2; ++i) from.force[i] = last[i];
-          double first[2] = {}, then[2] = {}, moved[2] = {}, nudged[2] = {z[0] + 1e-6, z[1] + 1e-6};
+          double first[2] = {}, then[2] = {};
           models::effect_reading_derivative(h.effect, a.values.data(), from, z, first);
           models::effect_reading_derivative(h.effect, a.values.data(), y, z, then);
-          models::effect_reading_derivative(h.effect, a.values.data(), y, nudged, moved);
-          for (int i = 0; i < 2; ++i) {
-            const double slope = (moved[i] - then[i]) / 1e-6 * run.interval;
-            z[i] += run.interval * (growth(slope) * first[i] + growth_of_ramp(slope) * (then[i] - first[i]));
+          if (k == 1) {  // linear in its state: the slope is the same at every sample
+            double moved[2] = {}, nudged[2] = {z[0] + kNudge, z[1] + kNudge};
+            models::effect_reading_derivative(h.effect, a.values.data(), y, nudged, moved);
+            for (int i = 0; i < 2; ++i) {
+              const double slope = (moved[i] - then[i]) / kNudge * run.interval;
+              held[i] = run.interval * growth(slope);
+              rising[i] = run.interval * growth_of_ramp(slope);
+            }
           }
+          for (int i = 0; i < 2; ++i) z[i] += held[i] * first[i] + rising[i] * (then[i] - first[i]);
         }
         last[0] = before[0];
         last[1] = before[1];

@@ -154,28 +154,32 @@ void try_other_stop(Projected& problem, const Hypothesis& hypothesis, const Eige
   }
 }
 
-/// Of two amplitudes that only their difference tells (the zeros of two forces that pull against each other) the fit may drive both to an end
-/// of their range, or far from nothing and near each other. One of them is absent instead, where the other makes up for it.
+/// Of two amplitudes that only their difference tells (the zeros of two forces that pull against each other; the leaks of two muscles, whose common part
+/// is K_C's and T_C's) the fit may drive both to an end of their range, or anywhere along what they have in common. One of them is absent instead, where
+/// the other makes up for it.
 void leave_out_what_nothing_tells(Projected& problem, const Hypothesis& hypothesis,
                                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                                   const std::vector<std::size_t>& free, const std::vector<double>& scale,
                                   int iterations, Eigen::VectorXd& x, Refined& refined) {
-  constexpr double kAsWell = 1.0;  // weighted squares
-  constexpr double kAlike = 0.1;   // of the larger
+  constexpr double kAsWell = 9;  // weighted squares, three sigma: what tells less of the second tells nothing
+  constexpr double kAlike = 0.1;  // of the larger: what they may have in common
   const auto alike = [&](Eigen::Index j) {
     if (x.size() != 2 || hypothesis.info().parameter_count != 2) return false;
     const double a = x[j] * scale[static_cast<std::size_t>(j)],
                  b = x[1 - j] * scale[static_cast<std::size_t>(1 - j)];
-    return std::abs(a - b) < kAlike * std::max(std::abs(a), std::abs(b));
+    return a * b > 0 && std::min(std::abs(a), std::abs(b)) > kAlike * std::max(std::abs(a), std::abs(b));
   };
   for (Eigen::Index j = 0; j < x.size(); ++j) {
     const std::size_t k = free[static_cast<std::size_t>(j)];
     const double null = hypothesis.info().parameters[k].null_value, margin = 1e-6 * (upper[j] - lower[j]);
     const bool at_end = x[j] <= lower[j] + margin || x[j] >= upper[j] - margin;
-    if (!hypothesis.amplitude[k] || null != 0 || lower[j] >= 0 || upper[j] <= 0) continue;
+    if (!hypothesis.amplitude[k] || null != 0 || lower[j] > 0 || upper[j] < 0 || x[j] == 0) continue;
     if (!at_end && !alike(j)) continue;
     Eigen::VectorXd low = lower, high = upper, without = x;
     low[j] = high[j] = without[j] = 0;
+    if (alike(j))  // the other as it is without what they have in common
+      without[1 - j] =
+          x[1 - j] - x[j] * scale[static_cast<std::size_t>(j)] / scale[static_cast<std::size_t>(1 - j)];
     BoundedFit fit =
         bounded_fit(std::ref(problem), without, low, high, {.rounds = iterations, .tolerance = 1e-6});
     if (fit.residual.size() == 0 || !(fit.residual.squaredNorm() < refined.loss + kAsWell)) continue;

@@ -60,6 +60,26 @@ bool Search::another_leaves_nothing(const Step& step) {
   return false;
 }
 
+bool Search::closes_all_that_is_left(const Step& step) {
+  constexpr double kUnits = 400, kOfLargest = 0.1;  // units of noise, and of what the largest effect closed
+  constexpr double kSmallest = 0.2;                 // of the floor
+  const Trial& second = step.trials.front();
+  if (second.material < kSmallest || units_closed(second) < std::max(kUnits, kOfLargest * largest_units_))
+    return false;
+  const Fit kept = found_.model;
+  const double blocks = data_.block_seconds;
+  const std::size_t notes = found_.notes.size();
+  found_.added.push_back(second.hypothesis);
+  move_to(refit(predictor_, found_.model, {active_of(second)}, found_.weights, 6));
+  const Step rest = screened_step();
+  const bool nothing = !rest.gate.significant || rest.gate.size < options_.material;
+  found_.added.pop_back();
+  found_.notes.resize(notes);
+  cut_blocks(data_, blocks);
+  move_to(kept);
+  return nothing;
+}
+
 bool Search::a_rival_goes_better_with(const Step& step) {
   if (a_rival_was_tried_ || step.trials.empty()) return false;
   a_rival_was_tried_ = true;

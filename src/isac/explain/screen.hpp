@@ -168,15 +168,31 @@ class Dictionary {
   [[nodiscard]] Chain chain(std::size_t column) const;
   [[nodiscard]] std::vector<std::string> variables(std::size_t column) const;
   [[nodiscard]] Eigen::VectorXd rows(std::size_t column) const;
+  /// All functions of one chain, a column each, in the rows `of` that chain.
+  [[nodiscard]] Eigen::MatrixXd rows_of(Chain chain, std::vector<Eigen::Index>& of) const;
 
  private:
   struct Signals;
+  struct At;
   const Prepared* data_;
   std::shared_ptr<const Signals> signals_;
   std::vector<Chain> chains_;
 };
 
-/// A weighted residual without what the generic functions can make of it, chain by chain: mostly noise, whatever is missing.
-[[nodiscard]] Eigen::VectorXd beside_generic_functions(const Prepared& data, const Eigen::VectorXd& residual);
+/// The functions of all chains, at hand for one residual after another; 8 bytes for each row and function.
+class GenericFunctions {
+ public:
+  explicit GenericFunctions(const Prepared& data);
+  /// A residual without what the functions can make of it, chain by chain: mostly noise, whatever is missing. Chains of fewer than twenty
+  /// rows for each function stay as they are.
+  [[nodiscard]] Eigen::VectorXd beside(const Eigen::VectorXd& residual) const;
+
+ private:
+  struct OfChain {
+    std::vector<Eigen::Index> at;
+    Eigen::MatrixXd x, gram;
+  };
+  std::vector<OfChain> chains_;
+};
 
 }  // namespace isac::explain

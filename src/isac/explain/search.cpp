@@ -39,7 +39,7 @@ Found Search::run() {
   say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
   place_slip(library_, data_, found_.baseline.residual);
   move_to(found_.baseline);
-  take_colour(place_.residual);
+  take_first_colour();
   if (!found_.wants_torque_of_free_runs) forward();
   if (found_.adequate && found_.added.empty() && !found_.steps.empty()) doubt_the_clock();
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
@@ -55,6 +55,18 @@ Found Search::run() {
   look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
   return std::move(found_);
+}
+
+void Search::take_first_colour() {
+  if (!look_.colour_beside_best || look_.found.empty()) {
+    take_colour(place_.residual);
+    return;
+  }
+  colour_beside_best_ = true;
+  std::vector<Active> effects;
+  for (const auto& [hypothesis, values] : look_.found)
+    effects.push_back({&library_.hypotheses[static_cast<std::size_t>(hypothesis)], values});
+  take_colour(refit(predictor_, found_.baseline, effects, found_.weights, 6).residual);
 }
 
 bool Search::touches_pressures() const {
@@ -132,6 +144,7 @@ void Search::forward() {
                            step.gate.size));
     report(step.trials);
     found_.adequate = !open;
+    if (!open && no_zero_wanders_beside_it()) continue;
     if (open && found_.added.empty() && is_convention(step)) continue;
     if (open && found_.added.empty() && a_wandering_zero_was_hidden_by(step)) {
       if (found_.wants_torque_of_free_runs) return;
@@ -147,7 +160,8 @@ void Search::forward() {
       const double size = step.trials.front().material;
       take = size >= options_.material;
       if (take && !found_.added.empty())
-        take = is_clear_enough(whole_size(step.trials.front()), chains_of(step.trials.front()));
+        take = is_clear_enough(whole_size(step.trials.front()), chains_of(step.trials.front())) ||
+               closes_all_that_is_left(step);
       if (take && found_.added.empty()) first_size_ = size;
       if (take) {
         largest_size_ = std::max(largest_size_, size);
@@ -165,9 +179,8 @@ void Search::forward() {
       move_to(refit(predictor_, found_.model, {active_of(best)}, found_.weights, 6));
     }
     // A valve's effect was added, and it is not all that is missing, or made the torque look as if a zero wandered.
-    const bool wanders = found_.weights.colour[static_cast<int>(Chain::kTorque)].wander > 0;
     if (look_.provisional && touches_pressures() &&
-        (found_.added.size() > 1 || (!take && (open || wanders)))) {
+        (found_.added.size() > 1 || (!take && (open || a_zero_wanders(found_.weights))))) {
       found_.worth_another_look = true;
       found_.settled = settled_steps();
       found_.colour_beside_best = colour_beside_best_;
@@ -213,11 +226,6 @@ void Search::take_settled() {
     effects.push_back(active_of(best));
   }
   found_.steps = look_.settled;
-  if (look_.colour_beside_best) {
-    colour_beside_best_ = true;
-    const Fit with_them = refit(predictor_, found_.baseline, effects, found_.weights, 6);
-    take_colour(unfiltered(data_, found_.weights, with_them.residual));
-  }
   // What was tried changed nothing in the rows of forces and motion, whose noise is another now.
   for (Step& step : found_.steps)
     for (Trial& t : step.trials) {

@@ -8,6 +8,7 @@
 
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "isac/explain/compare.hpp"
@@ -56,8 +57,10 @@ struct Look {
   std::vector<Step> settled;  ///< its steps that need not be taken again; of a library of the same hypotheses
   Gate gate;                  ///< of the baseline, where steps are settled
   Weights weights;            ///< of that look, whose colour of the pressures stands
-  bool colour_beside_best = false;  ///< its noise's colour was read off beside what it found
-  std::vector<TrialNote> notes;     ///< what was said up to them
+  bool colour_beside_best = false;  ///< its noise's colour was read off beside an effect
+  /// What it found, of a library of the same hypotheses: beside it the colour is read off where it had to be read off beside an effect.
+  std::vector<std::pair<int, Values>> found;
+  std::vector<TrialNote> notes;  ///< what was said up to them
 };
 
 /// `library` gains shapes that only the baseline's residual can tell.

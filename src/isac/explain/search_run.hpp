@@ -52,6 +52,8 @@ class Search {
   }
   bool touches_pressures() const;
   void first_weights();
+  /// Of the baseline's residual, or beside what an earlier look found where that one had to.
+  void take_first_colour();
   /// What stood anywhere near the top while effects were added: what may take the place of one of them.
   std::set<std::string> contenders() const;
   void report(const std::vector<Trial>& trials);
@@ -68,6 +70,9 @@ class Search {
   bool is_clear_enough(double size, unsigned chains) const {
     return size >= std::max(leaves_over_in(chains) ? kSecondOfFirst * first_size_ : 0.0, kSecondOfFloor);
   }
+  /// Two effects that go against each other leave little of either beside the other: a smaller second is as clear where it closes as much of the
+  /// noise's units as no equation's own error does, and nothing is left beside both.
+  bool closes_all_that_is_left(const Step& step);
   /// Does what was added enter rows that hang together with these? An equation that is only nearly right leaves nothing over in others: forces
   /// hang together with the motion, and pressures with one another.
   bool leaves_over_in(unsigned chains) const;
@@ -103,8 +108,16 @@ class Search {
   void choose_blocks(const Eigen::VectorXd& residual);
   ScreenOptions screen_options() const;
   void move_to(const Fit& fit);
+  /// Rows without what functions of the measured signals make of them: where the noise's colour is read off.
+  Eigen::VectorXd beside_functions(const Eigen::VectorXd& rows) const;
+  static bool a_zero_wanders(const Weights& weights) {
+    return weights.colour[static_cast<int>(Chain::kTorque)].wander > 0;
+  }
   /// What is large and missing hides that the sensors' zero wanders: beside it, that zero passes for further effects. The step is taken anew.
   bool a_wandering_zero_was_hidden_by(const Step& step);
+  /// And what is missing may look like such a zero where the runs, or the levels within one, differ by it: beside what was found it is none, and the
+  /// search begins anew with a zero that stands still.
+  bool no_zero_wanders_beside_it();
   /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
   void take_colour(const Eigen::VectorXd& left_over);
   /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.
@@ -184,6 +197,7 @@ class Search {
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   std::optional<Screen> narrow_;                    ///< of this place, that was asked for some ids only
   Responses responses_;
+  mutable std::optional<GenericFunctions> functions_;
   double first_size_ = 0;  ///< of the first effect, over the floor
   double largest_size_ =
       0;  ///< of all that were added: what is left is held against the largest, whose equation is only nearly right

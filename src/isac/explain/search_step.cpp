@@ -47,13 +47,18 @@ ScreenOptions Search::screen_options() const {
           .only = asked_for_};
 }
 
+Eigen::VectorXd Search::beside_functions(const Eigen::VectorXd& rows) const {
+  if (!functions_) functions_.emplace(data_);
+  return functions_->beside(rows);
+}
+
 void Search::move_to(const Fit& fit) {
   found_.model = fit;
   place_ = around(predictor_, found_.model, found_.weights);
 }
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
-  take_colours(data_, beside_generic_functions(data_, left_over), found_.weights);
+  take_colours(data_, beside_functions(left_over), found_.weights);
   if (!look_.settled.empty()) {  // the pressures' own has been read off already
     for (const Chain c : {Chain::kPressure1, Chain::kPressure2})
       found_.weights.colour[static_cast<int>(c)] = look_.weights.colour[static_cast<int>(c)];
@@ -67,13 +72,29 @@ void Search::take_colour(const Eigen::VectorXd& left_over) {
   move_to(found_.baseline);
 }
 
+bool Search::no_zero_wanders_beside_it() {
+  if (found_.added.empty() || colour_beside_best_ || !look_.settled.empty() ||
+      !a_zero_wanders(found_.weights))
+    return false;
+  const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
+  Weights weights = found_.weights;
+  take_colours(data_, beside_functions(rows), weights);
+  if (a_zero_wanders(weights)) return false;
+  say("beside it the force sensors' zero does not wander: once more with one that stands still");
+  colour_beside_best_ = true;
+  found_.added.clear();
+  found_.steps.clear();
+  first_size_ = largest_size_ = largest_units_ = 0;
+  take_colour(rows);
+  return true;
+}
+
 bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
-  const auto wanders = [](const Weights& w) { return w.colour[static_cast<int>(Chain::kTorque)].wander > 0; };
-  if (colour_beside_best_ || step.trials.empty() || wanders(found_.weights)) return false;
+  if (colour_beside_best_ || step.trials.empty() || a_zero_wanders(found_.weights)) return false;
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, step.trials.front().residual);
   Weights weights = found_.weights;
-  take_colours(data_, beside_generic_functions(data_, rows), weights);
-  if (!wanders(weights)) return false;
+  take_colours(data_, beside_functions(rows), weights);
+  if (!a_zero_wanders(weights)) return false;
   say(ranking_.id_of(step.trials.front()) +
       " had hidden that the force sensors' zero wanders: once more beside it");
   colour_beside_best_ = true;
@@ -102,7 +123,7 @@ Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
   for (const Trial& t : refit_all(large)) {
     const Eigen::VectorXd rows = unfiltered(data_, found_.weights, t.residual);
     Weights weights = found_.weights;
-    take_colours(data_, beside_generic_functions(data_, rows), weights);
+    take_colours(data_, beside_functions(rows), weights);
     const double here = log_likelihood(data_, weights, rows);
     if (here <= most) continue;
     most = here;
