@@ -256,6 +256,11 @@ TEST(Leak, follows_the_pressure_and_crosstalk_the_other_one) {
   effect_command<double>(find_effect("crosstalk"), share, x, nullptr, u);
   EXPECT_NEAR(u[0], 8e3, 1e-9);
   EXPECT_NEAR(u[1], 4e3, 1e-9);
+  const double either[] = {0.02, 0.01};
+  double p[2] = {2e5, 4e5};
+  effect_outlet_pressure(find_effect("crosstalk_direct"), either, p);
+  EXPECT_NEAR(p[0], 2.08e5, 1e-9);
+  EXPECT_NEAR(p[1], 4.02e5, 1e-9);
 }
 
 TEST(ThresholdPressure, takes_its_part_of_either_pressure) {

@@ -37,6 +37,8 @@ const char* name(Hook hook) {
       return "command";
     case Hook::kPressureRate:
       return "pressure rate";
+    case Hook::kOutletPressure:
+      return "outlet pressure";
     case Hook::kMusclePressure:
       return "muscle pressure";
     case Hook::kReading:

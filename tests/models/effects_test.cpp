@@ -121,6 +121,7 @@ TEST_F(EveryEffect, is_absent_at_its_null_values) {
       EXPECT_EQ(v[0], before[0]);
       EXPECT_EQ(v[1], before[1]);
       double p[2] = {valve.pressure[0], valve.pressure[1]};
+      effect_outlet_pressure(index(), q, p);
       effect_muscle_pressure(index(), q, p);
       EXPECT_EQ(p[0], valve.pressure[0]);
       EXPECT_EQ(p[1], valve.pressure[1]);
@@ -154,6 +155,7 @@ TEST_F(EveryEffect, does_something_at_its_typical_values) {
       double states[2] = {3e5, 3e5};
       effect_command(index(), q, valve, states, u);
       effect_pressure_rate(index(), q, valve, states, v);
+      effect_outlet_pressure(index(), q, p);
       effect_muscle_pressure(index(), q, p);
       change += std::abs(u[0] - valve.command[0]) + std::abs(v[0] - 1e7) + std::abs(v[1] + 1e6) +
                 std::abs(p[0] - 1e4);

@@ -209,6 +209,7 @@ unsigned chains_of(const Hypothesis& h) {
       return h.seen_by == SeenBy::kForceSensors ? bit(Chain::kTorque) : bit(Chain::kMotion);
     case Hook::kCommand:
     case Hook::kPressureRate:
+    case Hook::kOutletPressure:
       return kPressureChains;
     case Hook::kMusclePressure:
       return bit(Chain::kTorque);

@@ -21,6 +21,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
     double z[models::kMaxEffectStates];
   };
   std::vector<Placed> effects;
+  std::vector<const Active*> outlets;  // what both units' own pressures make of those in the muscles
   double delay = 0;
   for (const Active& a : model.effects) {
     const auto& info = a.hypothesis->info();
@@ -28,8 +29,15 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
       delay += models::effect_delay(a.hypothesis->effect, a.values.data());
     } else if (info.hook == Hook::kCommand || info.hook == Hook::kPressureRate) {
       effects.push_back({&a, {}});
+    } else if (info.hook == Hook::kOutletPressure) {
+      outlets.push_back(&a);
     }
   }
+  const auto at_the_outlet = [&](const double(&own)[2], double(&there)[2]) {
+    for (int i = 0; i < 2; ++i) there[i] = own[i];
+    for (const Active* a : outlets)
+      models::effect_outlet_pressure(a->hypothesis->effect, a->values.data(), there);
+  };
   // The commands as they arrive, between two samples where a delay ends there.
   const auto last = static_cast<std::ptrdiff_t>(n) - 1;
   const double shift = delay / dt, part = shift - std::floor(shift);
@@ -91,6 +99,20 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   p[1].resize(n);
   double state[2];  // what a sensor's model makes of its first reading, at the first reading's best value
   for (int i = 0; i < 2; ++i) state[i] = run.first_pressure[i] + (*in.pressure[i])[0] - run.pressure[i][0];
+  if (!outlets.empty()) {  // the units' own that make these
+    const double first[2] = {state[0], state[1]};
+    for (int round = 0; round < 8; ++round) {
+      double there[2];
+      at_the_outlet(state, there);
+      for (int i = 0; i < 2; ++i) state[i] += first[i] - there[i];
+    }
+  }
+  const auto put = [&](std::size_t k) {
+    double there[2];
+    at_the_outlet(state, there);
+    p[0][k] = there[0];
+    p[1][k] = there[1];
+  };
   {
     const double u0[2] = {arrived[0][0], arrived[1][0]};
     double u[2] = {gain * u0[0], gain * u0[1]};
@@ -113,17 +135,17 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   });
   if (effects.empty()) {
     // The same steps for the first-order lag alone, bit for bit.
-    for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t k = 0; k < n; ++k) {
+      put(k);
       for (int i = 0; i < 2; ++i) {
-        p[i][k] = state[i];
         const double u = gain * arrived[i][k], middle = state[i] + 0.5 * dt * ((u - state[i]) * rate);
         state[i] += dt * ((u - middle) * rate);
       }
+    }
     return;
   }
   for (std::size_t k = 0; k < n; ++k) {
-    p[0][k] = state[0];
-    p[1][k] = state[1];
+    put(k);
     if (k + 1 == n) break;
     const double u[2] = {arrived[0][k], arrived[1][k]};
     if (any_states) {

@@ -7,7 +7,7 @@
 ///   2. effect_command (and effect_valve_step once where u is new), in the order of the model; for each effect
 ///      `point.command` is the command as the effects before it left it, also in its derivative and its rest
 ///   3. v = (K_C u − p)/T_C, then effect_pressure_rate; effect_valve_derivative gives the states' rates
-///   4. effect_muscle_pressure on a copy of p, then Δp, p_mean and Σ effect_torque (effects.hpp)
+///   4. effect_outlet_pressure on p, the units' own pressures: those in the muscles, which sensors read; effect_muscle_pressure on a copy, then Δp, p_mean and Σ effect_torque (effects.hpp)
 ///   5. motion; then readings: effect_reading (and effect_reading_step once per sample), the angle's delay
 ///      (time_skew) by the caller's buffer, spikes by his random numbers, quantisation last
 /// Units: SI. Real time: no heap, no lock, noexcept, templated on the scalar; safe from any thread.
@@ -39,6 +39,14 @@ struct PressureRateCall {
   static void call(const S* q, const ValvePoint<S>& x, const S* z, S* v) noexcept {
     if constexpr (requires { E::pressure_rate(q, x, z, v); })
       if (!kHasStates<E> || z != nullptr) E::pressure_rate(q, x, z, v);
+  }
+};
+
+template <class S>
+struct OutletPressureCall {
+  template <class E>
+  static void call(const S* q, S* p) noexcept {
+    if constexpr (requires { E::outlet_pressure(q, p); }) E::outlet_pressure(q, p);
   }
 };
 
@@ -135,6 +143,13 @@ void effect_pressure_rate(int effect, const S* parameters, const ValvePoint<S>& 
   if (!Catalogue::holds(effect)) return;
   Catalogue::kTable<detail::PressureRateCall<S>>[static_cast<unsigned>(effect)](parameters, point, state,
                                                                                 rate);
+}
+
+/// Changes the two pressures, Pa, of the valve units into those in the muscles.
+template <class S>
+void effect_outlet_pressure(int effect, const S* parameters, S* pressure) noexcept {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::OutletPressureCall<S>>[static_cast<unsigned>(effect)](parameters, pressure);
 }
 
 /// Changes the two pressures, Pa, that the muscles make force of.

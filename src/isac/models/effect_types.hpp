@@ -21,6 +21,7 @@ enum class Hook : std::uint8_t {
   kTorque,          ///< effect_torque: added to the torque on the joint
   kCommand,         ///< effect_command: changes what the valves are asked for
   kPressureRate,    ///< effect_pressure_rate: changes how fast the pressures move
+  kOutletPressure,  ///< effect_outlet_pressure: what both units' own pressures make of those in the muscles
   kMusclePressure,  ///< effect_muscle_pressure: changes the pressure that the muscle makes force of
   kReading,         ///< effect_reading: changes what the sensors say
   kDelay,           ///< effect_delay: commands or angle readings come later; who simulates holds the buffer

@@ -64,7 +64,7 @@ struct CrosstalkPerMuscle {
   }
 };
 
-/// p_i = (lag of u_i) + x p_j: its rate has the reference's share and that of the other's rate.
+/// p_i = (what unit i makes of u_i) + x p_j: neither unit answers to the other's share.
 struct CrosstalkDirect {
   static constexpr EffectInfo kInfo{
       .id = "crosstalk_direct",
@@ -78,13 +78,13 @@ struct CrosstalkDirect {
       .linear = true,
       .confused_with = "crosstalk, pressure_sensor_gain",
       .told_apart_by = "the other answers at once",
-      .hook = Hook::kPressureRate,
+      .hook = Hook::kOutletPressure,
       .reported_as = "crosstalk"};
   template <class S>
-  static void pressure_rate(const S* q, const ValvePoint<S>& x, const S*, S* v) noexcept {
-    const S v0 = v[0], v1 = v[1];
-    v[0] = v0 + q[0] * (x.pressure[1] / x.lag + v1);
-    v[1] = v1 + q[1] * (x.pressure[0] / x.lag + v0);
+  static void outlet_pressure(const S* q, S* p) noexcept {
+    const S p0 = p[0], p1 = p[1];
+    p[0] = p0 + q[0] * p1;
+    p[1] = p1 + q[1] * p0;
   }
 };
 

@@ -64,10 +64,18 @@ void JointPhysics::add_effects(const std::vector<HiddenEffect>& effects) {
   }
 }
 
-models::JointPoint<double> JointPhysics::point_of(const StatePoint& point) const noexcept {
-  double p[2] = {point.x[0] * kPascal, point.x[1] * kPascal};
+std::array<double, 2> JointPhysics::pressures(const std::array<double, kPlantStates>& x) const noexcept {
+  std::array<double, 2> p = {x[0] * kPascal, x[1] * kPascal};
   for (const PlacedEffect& e : valve_effects_) {
-    models::effect_muscle_pressure(e.effect.index, e.effect.parameters.data(), p);
+    models::effect_outlet_pressure(e.effect.index, e.effect.parameters.data(), p.data());
+  }
+  return p;
+}
+
+models::JointPoint<double> JointPhysics::point_of(const StatePoint& point) const noexcept {
+  std::array<double, 2> p = pressures(point.x);
+  for (const PlacedEffect& e : valve_effects_) {
+    models::effect_muscle_pressure(e.effect.index, e.effect.parameters.data(), p.data());
   }
   return {.delta_pressure = 0.5 * (p[1] - p[0]),
           .mean_pressure = 0.5 * (p[0] + p[1]),

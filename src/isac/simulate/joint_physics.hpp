@@ -50,6 +50,8 @@ class JointPhysics {
   /// ṗ and the rates of the effects' states; φ̇ and φ̈ are the caller's. `reference`: Pa, as it arrives behind the dead time.
   void rates(const StatePoint& point, const std::array<double, 2>& reference,
              std::array<double, kPlantStates>& dxdt) const noexcept;
+  /// Pressures in the muscles, Pa, which sensors read: what effects between the valve units make of the units' own.
+  [[nodiscard]] std::array<double, 2> pressures(const std::array<double, kPlantStates>& x) const noexcept;
   [[nodiscard]] std::array<double, 2> forces(double torque,
                                              const std::array<double, 2>& pressure) const noexcept;
 

@@ -112,7 +112,7 @@ class Plant::Impl {
   PlantState state() const noexcept {
     PlantState s;
     s.time = time_;
-    for (std::size_t i = 0; i < 2; ++i) s.pressure[i] = x_[i] * kPerKgfCm2;
+    s.pressure = physics_.pressures(x_);
     s.joint = {.angle = x_[kPhi], .velocity = x_[kOmega]};
     const Torques torques = physics_.torques(point_at(time_, x_));
     s.torque = torques.muscle;
