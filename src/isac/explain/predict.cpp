@@ -109,13 +109,13 @@ bool reads_force(const ModelPoint& model) {
                      [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
 }
 
-bool clips_force(const ModelPoint& model) {
+}  // namespace
+
+bool clips_force(const ModelPoint& model) noexcept {
   return std::any_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
     return a.hypothesis->reads_force && !a.hypothesis->amplitude[0] && !is_null(a);
   });
 }
-
-}  // namespace
 
 void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned chains,
                             Eigen::VectorXd& out) const {

@@ -39,6 +39,9 @@ struct ModelPoint {
   std::vector<double> rest;
 };
 
+/// Is a force's reading clipped? Then rows of the torque are not linear in the baseline.
+[[nodiscard]] bool clips_force(const ModelPoint& model) noexcept;
+
 class Predictor {
  public:
   /// `threads`: that one prediction of all runs may use.

@@ -185,17 +185,19 @@ void Search::put_first(std::size_t i) {
 }
 
 void Search::swap_and_drop() {
+  asked_for_ = contenders();
   std::vector<Trial> chosen;
   for (std::size_t i = 0; i < found_.added.size(); ++i) chosen.push_back(found_.steps[i].trials.front());
   Step last = std::move(found_.steps.back());
-  std::vector<Step> steps;
+  std::vector<Step> standing = std::move(found_.steps),
+                    steps;  // one for each that is chosen, and what becomes of them
+  standing.pop_back();
   bool changed = false;
   const double blocks = data_.block_seconds;
   const Fit whole = found_.model;
-  asked_for_ = contenders();
   for (std::size_t i = 0; i < chosen.size();) {
     if (!changed && i + 1 == chosen.size()) {  // beside all before it: so it was added
-      steps.push_back(std::move(found_.steps[i]));
+      steps.push_back(std::move(standing[i]));
       break;
     }
     std::vector<Trial> others = chosen;
@@ -210,23 +212,33 @@ void Search::swap_and_drop() {
     const bool shows = !step.trials.empty() && step.gate.significant;
     if (!shows && !changed && missed_by > kLargeForSure) {
       // Beside a wrong size of the others its response is small; the joint fit says what it is worth.
-      steps.push_back(std::move(found_.steps[i]));
+      steps.push_back(std::move(standing[i]));
       ++i;
       continue;
     }
     if (!shows) {
       say(fmt::format("{} is not missed when it is dropped", ranking_.id_of(chosen[i])));
       chosen = others;
+      standing.erase(standing.begin() + static_cast<std::ptrdiff_t>(i));
       changed = true;
       continue;
     }
     if (ranking_.id_of(step.trials.front()) != ranking_.id_of(chosen[i])) {
+      // Without it the others may have come to a wrong size, beside which another does better: both sets are refitted whole.
+      std::vector<Trial> swapped = chosen;
+      swapped[i] = step.trials.front();
+      const double worse = (with(swapped).loss - with(chosen).loss) / step.screen.noise_unit;
+      if (worse > kLargeForSure) {
+        steps.push_back(std::move(standing[i]));
+        ++i;
+        continue;
+      }
       say(fmt::format("{} does better in place of {}", ranking_.id_of(step.trials.front()),
                       ranking_.id_of(chosen[i])));
       changed = true;
     }
     chosen[i] = step.trials.front();
-    step.screen = std::move(found_.steps[steps.size()].screen);  // of everything that was looked for
+    step.screen = std::move(standing[i].screen);  // of everything that was looked for
     steps.push_back(std::move(step));
     ++i;
   }

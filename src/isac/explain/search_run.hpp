@@ -137,6 +137,9 @@ class Search {
   /// Linear responses let runs at rest stand where they will; within a step of the encoder, as a joint refit has them, they may tell when it
   /// slipped.
   void choose_moment(Step& step) const;
+  /// Where a force's reading is clipped, rows of the torque are not linear in the baseline, and off which it was projected holds nearby only: a rival that
+  /// moves it far (a gain of the encoder for an added inertia) is refitted with it before it is ruled out.
+  void fit_with_the_baseline(std::vector<Trial>& trials) const;
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const;
   /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
   bool is_open_at_least(const Step& step, double size) const;

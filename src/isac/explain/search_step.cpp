@@ -230,6 +230,23 @@ std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
   return trials;
 }
 
+void Search::fit_with_the_baseline(std::vector<Trial>& trials) const {
+  if (trials.empty()) return;
+  const Trial first = trials.front();
+  share_work(options_.threads, trials.size(), [&](std::size_t i) {
+    Trial& t = trials[i];
+    if (!ranking_.share_readings(t, first)) return;
+    const Fit fit = refit(predictor_, found_.model, {active_of(t)}, found_.weights, 12);
+    Eigen::VectorXd residual = place_.project(fit.residual);
+    const double loss = residual.squaredNorm();
+    if (!(loss < t.loss)) return;
+    t.values = fit.model.effects.back().values;
+    t.residual = std::move(residual);
+    t.loss = loss;
+  });
+  ranking_.rank(trials, place_.residual);
+}
+
 bool Search::is_open_at_least(const Step& step, double size) const {
   std::set<std::string> every;
   for (const Hypothesis& h : library_.hypotheses) every.insert(h.id());
@@ -256,6 +273,7 @@ Step Search::refitted(Step step) {
   });
   if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
   ranking_.rank(step.trials, place_.residual);
+  if (clips_force(found_.model.model)) fit_with_the_baseline(step.trials);
   choose_moment(step);
   if (found_.added.empty()) put_material_first(step);
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
