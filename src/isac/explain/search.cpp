@@ -18,7 +18,8 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
-constexpr double kToldApart = 4;  // units of noise, two sigma
+constexpr double kToldApart =
+    16;  // units of noise, four sigma: where no offset was, one day in fifty had 9 to 13
 constexpr double kOwnError =
     0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
@@ -390,8 +391,16 @@ bool Search::leave_half_a_step(bool asked_for) {
   for (std::size_t i = 0; i < std::min(found_.added.size(), found_.steps.size()); ++i)
     if (nests(library_.hypotheses[static_cast<std::size_t>(found_.added[i])].id(), "torque_offset"))
       least = std::max({least, kLargeForSure, kOwnError * found_.steps[i].units});
-  if (!asked_for && without - fit.loss < least * unit) {  // hardly told
-    fit = within(0, 0);
+  const double told = (without - fit.loss) / unit;
+  if (!asked_for) {
+    // Within the step any reading is as likely before the runs are asked: their mean with that, or the middle where they hardly tell.
+    double reading = 0;
+    for (std::size_t i = 0; i < fit.tolerances; ++i)
+      if (told >= least && fit.model.effects[i].hypothesis->id() == "encoder_offset") {
+        const double value = fit.model.effects[i].values[0], before = half * half / 3;
+        reading = value * before / (before + value * value / told);
+      }
+    fit = within(reading, reading);
     untold_half_step_ = half;
   }
   move_to(fit);
