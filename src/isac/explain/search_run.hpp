@@ -101,7 +101,7 @@ class Search {
   void keep_what_holds_an_offset();
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
   /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.) It stays in the middle of the step unless
-  /// the runs tell more, or a remainder `asked_for` it.
+  /// the runs tell more; then it is the mean of what they and the step say. A remainder may have `asked_for` it.
   bool leave_half_a_step(bool asked_for);
 
   // One step: search_step.cpp.
