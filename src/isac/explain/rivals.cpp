@@ -72,7 +72,7 @@ bool Search::closes_all_that_is_left(const Step& step) {
   found_.added.push_back(second.hypothesis);
   move_to(refit(predictor_, found_.model, {active_of(second)}, found_.weights, 6));
   const Step rest = screened_step();
-  const bool nothing = !rest.gate.significant || rest.gate.size < options_.material;
+  const bool nothing = !rest.gate.significant;
   found_.added.pop_back();
   found_.notes.resize(notes);
   cut_blocks(data_, blocks);
@@ -228,7 +228,9 @@ void Search::swap_and_drop() {
       std::vector<Trial> swapped = chosen;
       swapped[i] = step.trials.front();
       const double worse = (with(swapped).loss - with(chosen).loss) / step.screen.noise_unit;
-      if (worse > kLargeForSure) {
+      constexpr double kOwnError =
+          0.1;  // of the units that the largest closed: a simpler name may leave it over
+      if (worse > std::max(kLargeForSure, kOwnError * largest_units_)) {
         steps.push_back(std::move(standing[i]));
         ++i;
         continue;

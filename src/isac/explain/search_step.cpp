@@ -59,6 +59,7 @@ void Search::move_to(const Fit& fit) {
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
   take_colours(data_, beside_functions(left_over), found_.weights);
+  functions_.reset();            // 40 MB that a screen has better use for
   if (!look_.settled.empty()) {  // the pressures' own has been read off already
     for (const Chain c : {Chain::kPressure1, Chain::kPressure2})
       found_.weights.colour[static_cast<int>(c)] = look_.weights.colour[static_cast<int>(c)];
@@ -79,6 +80,7 @@ bool Search::no_zero_wanders_beside_it() {
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
   Weights weights = found_.weights;
   take_colours(data_, beside_functions(rows), weights);
+  functions_.reset();
   if (a_zero_wanders(weights)) return false;
   say("beside it the force sensors' zero does not wander: once more with one that stands still");
   colour_beside_best_ = true;
@@ -94,6 +96,7 @@ bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, step.trials.front().residual);
   Weights weights = found_.weights;
   take_colours(data_, beside_functions(rows), weights);
+  functions_.reset();
   if (!a_zero_wanders(weights)) return false;
   say(ranking_.id_of(step.trials.front()) +
       " had hidden that the force sensors' zero wanders: once more beside it");
