@@ -18,8 +18,7 @@ constexpr std::size_t kContenders = 16;  // of each screen
 constexpr double kConvention = 0.12;     // relative, of the encoder's half step
 // Of a sample, or half of one: a dead time is fitted within 0.3 %, and within its own error where it is small.
 constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06;
-constexpr double kToldApart =
-    16;  // units of noise, four sigma: where no offset was, one day in fifty had 9 to 13
+constexpr double kToldApart = 16;  // units of noise, four sigma: offsets that were not there closed 13
 constexpr double kOwnError =
     0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample

@@ -7,7 +7,8 @@
 ///   2. effect_command (and effect_valve_step once where u is new), in the order of the model; for each effect
 ///      `point.command` is the command as the effects before it left it, also in its derivative and its rest
 ///   3. v = (K_C u − p)/T_C, then effect_pressure_rate; effect_valve_derivative gives the states' rates
-///   4. effect_outlet_pressure on p, the units' own pressures: those in the muscles, which sensors read; effect_muscle_pressure on a copy, then Δp, p_mean and Σ effect_torque (effects.hpp)
+///   4. effect_outlet_pressure on p, the units' own pressures: those in the muscles, which sensors read;
+///      effect_muscle_pressure on a copy, then Δp, p_mean and Σ effect_torque (effects.hpp)
 ///   5. motion; then readings: effect_reading (and effect_reading_step once per sample), the angle's delay
 ///      (time_skew) by the caller's buffer, spikes by his random numbers, quantisation last
 /// Units: SI. Real time: no heap, no lock, noexcept, templated on the scalar; safe from any thread.
