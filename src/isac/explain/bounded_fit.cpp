@@ -116,9 +116,11 @@ BoundedFit bounded_fit(const Evaluate& evaluate, Eigen::VectorXd start, const Ei
         }
         continue;
       }
+      // A full step that closed what it promised leaves nothing to the next: what bends the residual bends the promise as well.
+      const bool kept = damping == 0 && std::abs(fit.loss - loss - promised) < options.tolerance * loss;
       damping = fit.loss - loss > 0.25 * promised ? damping / 10 : std::max(damping, 0.05);
       if (damping < 1e-4) damping = 0;
-      const bool enough = fit.loss - loss < options.tolerance * loss;
+      const bool enough = kept || fit.loss - loss < options.tolerance * loss;
       fit.x = x;
       fit.residual = std::move(residual);
       fit.loss = loss;

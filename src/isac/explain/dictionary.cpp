@@ -6,6 +6,7 @@
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/screen.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -281,18 +282,21 @@ Eigen::MatrixXd Dictionary::rows_of(Chain chain, std::vector<Eigen::Index>& of) 
   return x;
 }
 
-GenericFunctions::GenericFunctions(const Prepared& data) {
+GenericFunctions::GenericFunctions(const Prepared& data, int threads) {
   const Dictionary generic(data);
-  for (const Chain chain : {Chain::kTorque, Chain::kPressure1, Chain::kPressure2, Chain::kMotion}) {
-    if (!data.has(chain)) continue;
+  chains_.resize(kChains);
+  share_work(threads, kChains, [&](std::size_t c) {
+    const auto chain = static_cast<Chain>(c);
+    if (!data.has(chain)) return;
     OfChain of;
     of.x = generic.rows_of(chain, of.at);
-    if (of.x.rows() < 20 * of.x.cols()) continue;
+    if (of.x.rows() < 20 * of.x.cols()) return;
     of.gram = of.x.transpose() * of.x;
     // Nearly dependent functions, and those that the data does not move, must not blow up.
-    for (Eigen::Index c = 0; c < of.gram.cols(); ++c) of.gram(c, c) = of.gram(c, c) * (1 + 1e-6) + 1e-9;
-    chains_.push_back(std::move(of));
-  }
+    for (Eigen::Index i = 0; i < of.gram.cols(); ++i) of.gram(i, i) = of.gram(i, i) * (1 + 1e-6) + 1e-9;
+    chains_[c] = std::move(of);
+  });
+  std::erase_if(chains_, [](const OfChain& of) { return of.at.empty() || of.gram.size() == 0; });
 }
 
 Eigen::VectorXd GenericFunctions::beside(const Eigen::VectorXd& residual) const {

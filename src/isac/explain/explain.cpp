@@ -186,7 +186,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
                     const ExplainOptions& options) {
   check_terms(options.baseline);
   Prepared data = prepare(runs, options.rig, options.baseline, 4.0, heldout.first_start());
-  QuietPressure quiet = QuietPressure::learn(data);
+  QuietPressure quiet = QuietPressure::learn(data, nullptr, options.threads);
   auto library_here = std::make_unique<Library>(make_library(data, options.excluded));
   auto predictor_here = std::make_unique<Predictor>(data, options.threads);
   Look first;
@@ -209,15 +209,15 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (found.worth_another_look) {
     const ModelPoint valves = found.model.model;
     first_library = std::move(library_here);
-    quiet = QuietPressure::learn(data, &valves);
+    quiet = QuietPressure::learn(data, &valves, options.threads);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data, options.threads);
     if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
     Look again;
     again.contenders = std::move(found.contenders);
+    again.gate = found.gate;
     if (same_hypotheses(*first_library, *library_here)) {
       again.settled = std::move(found.settled);
-      again.gate = found.gate;
       again.weights = found.weights;
       again.colour_beside_best = found.colour_beside_best;
       for (std::size_t i = 0; i < found.added.size(); ++i)

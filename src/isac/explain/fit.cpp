@@ -98,9 +98,11 @@ std::vector<Eigen::Index> rows_of(const Prepared& data, unsigned chains) {
   return rows;
 }
 
-bool reads_force(const ModelPoint& model) {
-  return std::any_of(model.effects.begin(), model.effects.end(),
-                     [](const Active& a) { return a.hypothesis->reads_force; });
+/// A reading of a force that is shifted is linear in the baseline still.
+bool bends_force(const ModelPoint& model) {
+  return std::any_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
+    return a.hypothesis->reads_force && !a.hypothesis->shifts_force;
+  });
 }
 
 /// Derivative of all rows by one coordinate; other chains' rows are left as they are.
@@ -116,7 +118,7 @@ void differentiate(const Predictor& predictor, const ModelPoint& model, const Ei
         out[static_cast<Eigen::Index>(i)] = predictor.stiffness(model);
     return;
   }
-  if (c.base >= 0 && (c.chains & kPressureChains) == 0 && !reads_force(model)) {
+  if (c.base >= 0 && (c.chains & kPressureChains) == 0 && !bends_force(model)) {
     // Linear: the prediction of a baseline that consists of this term alone.
     std::fill(there.base.begin(), there.base.begin() + static_cast<std::ptrdiff_t>(there.base.size()), 0.0);
     for (std::size_t j = 0; j < there.base.size(); ++j)
@@ -143,9 +145,9 @@ void differentiate(const Predictor& predictor, const ModelPoint& model, const Ei
   out = (out - here) / step;
 }
 
-/// The same, weighted, for a step of the coordinate's scale; 0 in the rows that it does not touch.
-void weighted_slope(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here,
-                    const Coordinate& c, double value, const Weights& weights, Eigen::VectorXd& column) {
+/// The same for a step of the coordinate's scale; 0 in the rows that it does not touch.
+void slope_of(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here,
+              const Coordinate& c, double value, Eigen::VectorXd& column) {
   column = here;
   differentiate(predictor, model, here, c, value, column);
   for (std::size_t i = 0; i < predictor.rows(); ++i) {
@@ -153,7 +155,6 @@ void weighted_slope(const Predictor& predictor, const ModelPoint& model, const E
     const bool touched = (bit(predictor.data().rows[i].chain) & c.chains) != 0;
     slope = touched && std::isfinite(slope) ? slope * c.scale : 0.0;
   }
-  weigh(predictor.data(), weights, column);
 }
 
 class Rows final : public ceres::CostFunction {
@@ -183,13 +184,15 @@ class Rows final : public ceres::CostFunction {
     for (Eigen::Index i = 0; i < n; ++i) residual[i] = column[rows_[static_cast<std::size_t>(i)]];
     if (!residual.allFinite()) return false;
     if (jacobian == nullptr) return true;
-    jacobian->resize(n, static_cast<Eigen::Index>(coordinates_.size()));
+    Eigen::MatrixXd slopes(here.size(), static_cast<Eigen::Index>(coordinates_.size()));
     for (std::size_t j = 0; j < coordinates_.size(); ++j) {
       const Coordinate& c = coordinates_[j];
       const auto k = static_cast<Eigen::Index>(j);
-      weighted_slope(predictor_, model, here, c, x[k] * c.scale, weights_, column);
-      for (Eigen::Index i = 0; i < n; ++i) (*jacobian)(i, k) = column[rows_[static_cast<std::size_t>(i)]];
+      slope_of(predictor_, model, here, c, x[k] * c.scale, column);
+      slopes.col(k) = column;
     }
+    weigh(predictor_.data(), weights_, slopes);
+    *jacobian = slopes(rows_, Eigen::all);
     return true;
   }
 
@@ -389,9 +392,10 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
     Eigen::MatrixXd slopes(n, static_cast<Eigen::Index>(coordinates.size()));
     Eigen::VectorXd column;
     for (std::size_t j = 0; j < coordinates.size(); ++j) {
-      weighted_slope(predictor, fit.model, here, coordinates[j], fit.value(coordinates[j]), weights, column);
+      slope_of(predictor, fit.model, here, coordinates[j], fit.value(coordinates[j]), column);
       slopes.col(static_cast<Eigen::Index>(j)) = column;
     }
+    weigh(predictor.data(), weights, slopes);
     return slopes;
   };
   std::vector<Coordinate> inside, at_bound;
@@ -413,8 +417,8 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
   return slopes_of(inside);
 }
 
-Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
-                         const Active& effect, const Weights& weights) {
+Eigen::VectorXd change(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
+                       const Active& effect) {
   Eigen::VectorXd change;
   if (predictor.adds_up(fit.model, *effect.hypothesis)) {
     change = Eigen::VectorXd::Zero(here.size());
@@ -426,8 +430,14 @@ Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen
     predictor.predict(with, effect.hypothesis->chains, change);
     change -= here;
   }
-  weigh(predictor.data(), weights, change);
   return change;
+}
+
+Eigen::VectorXd response(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
+                         const Active& effect, const Weights& weights) {
+  Eigen::VectorXd rows = change(predictor, fit, here, effect);
+  weigh(predictor.data(), weights, rows);
+  return rows;
 }
 
 }  // namespace isac::explain

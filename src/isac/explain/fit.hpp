@@ -60,8 +60,10 @@ struct Held {
                                             const Weights& weights, std::vector<Coordinate>* used = nullptr,
                                             Held* held = nullptr);
 
-/// Weighted difference of the rows when an effect is added to the fit's model, nothing refitted. `here` is the model's own
-/// prediction of all rows.
+/// Difference of the rows when an effect is added to the fit's model, nothing refitted. `here` is the model's own prediction of all rows.
+[[nodiscard]] Eigen::VectorXd change(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,
+                                     const Active& effect);
+/// The same, weighted.
 [[nodiscard]] Eigen::VectorXd response(const Predictor& predictor, const Fit& fit,
                                        const Eigen::VectorXd& here, const Active& effect,
                                        const Weights& weights);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "isac/explain/workers.hpp"
+
 namespace isac::explain {
 namespace {
 
@@ -16,7 +18,7 @@ constexpr int kParametersOfOne = 1 + kChoosingOne;
 
 }  // namespace
 
-StandingOut standing_out(const Around& place, const Screen& screen) {
+StandingOut standing_out(const Around& place, const Screen& screen, int threads) {
   StandingOut out;
   const Prepared& data = place.predictor->data();
   const Dictionary generic(data);
@@ -34,11 +36,13 @@ StandingOut standing_out(const Around& place, const Screen& screen) {
   out.chain = generic.chain(order.front().second);
   for (const auto& [gain, function] : order) {
     if (out.functions.size() >= kTried) break;
-    if (generic.chain(function) != out.chain) continue;
-    Eigen::VectorXd rows = generic.rows(function);
-    weigh(data, *place.weights, rows);
-    out.functions.push_back({function, place.project(rows)});
+    if (generic.chain(function) == out.chain) out.functions.push_back({function, {}});
   }
+  share_work(threads, out.functions.size(), [&](std::size_t i) {
+    Eigen::VectorXd rows = generic.rows(out.functions[i].function);
+    weigh(data, *place.weights, rows);
+    out.functions[i].rows = place.project(rows);
+  });
   return out;
 }
 
@@ -71,8 +75,8 @@ GenericFit fit_generic(const Around& place, const StandingOut& among, double noi
   return fit;
 }
 
-GenericFit fit_generic(const Around& place, const Screen& screen) {
-  return fit_generic(place, standing_out(place, screen), screen.noise_unit);
+GenericFit fit_generic(const Around& place, const Screen& screen, int threads) {
+  return fit_generic(place, standing_out(place, screen, threads), screen.noise_unit);
 }
 
 Comparison behind_generic(const Prepared& data, const Eigen::VectorXd& named, int named_parameters,

@@ -39,9 +39,9 @@ struct StandingOut {
 };
 
 /// `screen`: of the same place, with its dictionary.
-[[nodiscard]] StandingOut standing_out(const Around& place, const Screen& screen);
+[[nodiscard]] StandingOut standing_out(const Around& place, const Screen& screen, int threads = 1);
 [[nodiscard]] GenericFit fit_generic(const Around& place, const StandingOut& among, double noise_unit);
-[[nodiscard]] GenericFit fit_generic(const Around& place, const Screen& screen);
+[[nodiscard]] GenericFit fit_generic(const Around& place, const Screen& screen, int threads = 1);
 
 /// How far a named effect's residual is behind that of nameless functions (t > 0), each counted as the one of many that was looked for.
 [[nodiscard]] Comparison behind_generic(const Prepared& data, const Eigen::VectorXd& named,

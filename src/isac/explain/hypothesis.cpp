@@ -178,6 +178,7 @@ bool jumps_with_direction(int effect, const EffectInfo& info) {
 /// Which of angle, forces, pressures a reading effect changes, asked of its equation.
 struct Touches {
   bool angle = false, force = false, pressure = false;
+  bool shifts_force = false;  ///< by as much, whatever the force
 };
 
 Touches touches(int effect, const EffectInfo& info) {
@@ -199,6 +200,15 @@ Touches touches(int effect, const EffectInfo& info) {
   t.angle = y.angle != before.angle;
   t.force = y.force[0] != before.force[0] || y.force[1] != before.force[1];
   t.pressure = y.pressure[0] != before.pressure[0] || y.pressure[1] != before.pressure[1];
+  models::Readings<double> other{{70, 640}, {3e5, 4e5}, 0.4};
+  const models::Readings<double> other_before = other;
+  models::effect_reading(effect, q.data(), 20.3, z, other);
+  t.shifts_force = t.force && info.state_count == 0;
+  for (int i = 0; i < 2; ++i) {
+    constexpr double kRounding = 1e-9;  // N
+    const double change = y.force[i] - before.force[i], there = other.force[i] - other_before.force[i];
+    t.shifts_force = t.shifts_force && std::abs(change - there) < kRounding;
+  }
   return t;
 }
 
@@ -250,6 +260,7 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
     const Touches t = touches(effect, info);
     h.reads_angle = t.angle;
     h.reads_force = t.force;
+    h.shifts_force = t.shifts_force;
     h.reads_pressure = t.pressure;
   }
   h.seen_by = info.where == Subsystem::kMuscle ? SeenBy::kForceSensors : SeenBy::kMotionOnly;

@@ -43,7 +43,8 @@ struct Hypothesis {
   SeenBy seen_by = SeenBy::kForceSensors;
   bool dry = false;  ///< its torque jumps with the direction of motion
   bool reads_angle = false, reads_force = false, reads_pressure = false;  ///< sensors that it changes
-  unsigned chains = 0;                                                    ///< that it changes
+  bool shifts_force = false;   ///< a force's reading by as much, whatever the force
+  unsigned chains = 0;         ///< that it changes
   std::vector<Values> shapes;  ///< starts; amplitudes at their typical values
   Values lower{}, upper{};
   std::array<bool, models::kMaxEffectParameters> free{};  ///< fitted; the others stay as the shape says

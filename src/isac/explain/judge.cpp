@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "isac/explain/screen.hpp"
+#include "isac/explain/workers.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::explain {
@@ -130,7 +131,7 @@ class Elsewhere {
 }  // namespace
 
 FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed, double significance,
-                   std::optional<double> statistic) {
+                   std::optional<double> statistic, int threads) {
   const Eigen::Index blocks = scores.rows(), columns = scores.cols();
   if (columns == 0) return {};  // nothing was looked for
   Eigen::MatrixXd scaled = scores;
@@ -140,23 +141,28 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   }
   const double observed =
       statistic.value_or(columns > 0 ? scaled.colwise().sum().cwiseAbs().maxCoeff() : 0.0);
-  std::vector<double> all;
-  all.reserve(static_cast<std::size_t>(flips));
   std::mt19937_64 random(seed);
-  int reached = 1;
   constexpr Eigen::Index kAtOnce = 128;
+  std::vector<Eigen::MatrixXd> signs;
   for (int done = 0; done < flips; done += kAtOnce) {
     const Eigen::Index now = std::min<Eigen::Index>(kAtOnce, flips - done);
-    Eigen::MatrixXd signs(now, blocks);
+    Eigen::MatrixXd& of_these = signs.emplace_back(now, blocks);
     for (Eigen::Index i = 0; i < now; ++i)
       for (Eigen::Index b = 0; b < blocks; b += 64) {
         std::uint64_t bits = random();
         for (Eigen::Index k = b; k < std::min(b + 64, blocks); ++k, bits >>= 1)
-          signs(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
+          of_these(i, k) = (bits & 1) != 0 ? 1.0 : -1.0;
       }
-    const Eigen::VectorXd largest = (signs * scaled).cwiseAbs().rowwise().maxCoeff();
-    all.insert(all.end(), largest.data(), largest.data() + largest.size());
-    reached += static_cast<int>((largest.array() >= observed * (1 - 1e-12)).count());
+  }
+  std::vector<Eigen::VectorXd> largest(signs.size());
+  share_work(threads, signs.size(),
+             [&](std::size_t i) { largest[i] = (signs[i] * scaled).cwiseAbs().rowwise().maxCoeff(); });
+  std::vector<double> all;
+  all.reserve(static_cast<std::size_t>(flips));
+  int reached = 1;
+  for (const Eigen::VectorXd& of_these : largest) {
+    all.insert(all.end(), of_these.data(), of_these.data() + of_these.size());
+    reached += static_cast<int>((of_these.array() >= observed * (1 - 1e-12)).count());
   }
   FlipTest test;
   test.statistic = observed;
@@ -292,7 +298,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
       of.push_back(static_cast<Eigen::Index>(k));
       largest = std::max(largest, result.columns[k].T);
     }
-    return flip_test(scores(Eigen::all, of), options.flips, options.seed, level, largest);
+    return flip_test(scores(Eigen::all, of), options.flips, options.seed, level, largest, options.threads);
   };
   const FlipTest test = flipped([](const Column&) { return true; }, kShareOfEach * options.significance);
   result.p_value = test.p_value;

@@ -73,19 +73,12 @@ Predictor::Predictor(const Prepared& data, int threads) : data_(&data), threads_
 namespace {
 
 /// Changes by pressure sensors on a predicted pressure.
-void read_pressures(const ModelPoint& model, const PreparedRun& run, std::vector<double> (&p)[2]) {
+void read_pressures(const ModelPoint& model, std::vector<double> (&p)[2]) {
   for (const Active& a : model.effects) {
-    const Hypothesis& h = *a.hypothesis;
-    if (!h.reads_pressure || is_null(a)) continue;
-    for (std::size_t k = 0; k < p[0].size(); ++k) {
-      models::Readings<double> y;
-      y.pressure[0] = p[0][k];
-      y.pressure[1] = p[1][k];
-      models::effect_reading(h.effect, a.values.data(), time_of(h, run, k),
-                             static_cast<const double*>(nullptr), y);
-      p[0][k] = y.pressure[0];
-      p[1][k] = y.pressure[1];
-    }
+    if (!a.hypothesis->reads_pressure || is_null(a)) continue;
+    const PressureReading made(a);
+    for (int i = 0; i < 2; ++i)
+      for (double& pressure : p[i]) pressure = made.constant[i] + made.slope[i] * pressure;
   }
 }
 
@@ -109,6 +102,14 @@ bool reads_force(const ModelPoint& model) {
                      [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
 }
 
+/// Are all such readings a function of the force at that sample, which passes no kernel?
+bool reads_force_by_sample(const ModelPoint& model) {
+  return std::all_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
+    const Hypothesis& h = *a.hypothesis;
+    return !h.reads_force || is_null(a) || (h.info().state_count == 0 && h.amplitude[0]);
+  });
+}
+
 }  // namespace
 
 bool clips_force(const ModelPoint& model) noexcept {
@@ -130,7 +131,8 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
   };
   if ((chains & bit(Chain::kTorque)) != 0 && run.has_torque) {
     std::vector<double> extra = torque_of_effects(model, run, in, false), smooth;
-    if (reads_force(model)) {
+    const bool row_by_row = reads_force(model) && reads_force_by_sample(model);
+    if (reads_force(model) && !row_by_row) {
       // A torque of low-passed signals is low-passed already: a gain or a lag must not smooth its noise once more, or it would gain by that. (An
       // inertia of 6 % too much was called a force sensor's gain.) Effects' torques and clipped readings jump, and pass the kernel after that.
       if (!extra.empty()) extra = low_pass(extra, data_->smoothing.torque / run.interval);
@@ -158,7 +160,9 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
     };
     const Kernel kernel(data_->smoothing.torque / run.interval);
     for_rows(Chain::kTorque, [&](std::size_t k) {
-      return base() + (smooth.empty() ? 0.0 : smooth[k]) + (extra.empty() ? 0.0 : kernel(extra, k));
+      const double torque =
+          base() + (smooth.empty() ? 0.0 : smooth[k]) + (extra.empty() ? 0.0 : kernel(extra, k));
+      return row_by_row ? torque + change_at(model, run, k, torque) : torque;
     });
   }
   if ((chains & bit(Chain::kMotion)) != 0 && run.is_free && !run.slow_acceleration.empty()) {
@@ -186,7 +190,7 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
   if ((chains & kPressureChains) != 0 && run.has_command && gain_ >= 0) {
     std::vector<double> p[2];
     pressures_of(model, run, in, p);
-    read_pressures(model, run, p);
+    read_pressures(model, p);
     const Kernel kernel(data_->smoothing.torque / run.interval);
     for_rows(Chain::kPressure1, [&](std::size_t k) { return kernel(p[0], k); });
     for_rows(Chain::kPressure2, [&](std::size_t k) { return kernel(p[1], k); });
@@ -194,7 +198,10 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
 }
 
 bool Predictor::adds_up(const ModelPoint& model, const Hypothesis& effect) const noexcept {
-  return effect.info().hook == Hook::kTorque && !reads_force(model);
+  return effect.info().hook == Hook::kTorque &&
+         std::none_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
+           return a.hypothesis->reads_force && !a.hypothesis->shifts_force && !is_null(a);
+         });
 }
 
 /// How many samples a torque need not be asked for, between two that the kernel sums. It is a smooth function of signals that passed the
@@ -286,7 +293,7 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
   }
   if (run.has_command && gain_ >= 0) {
     pressures_of(model, run, in, rate.pressure);
-    read_pressures(model, run, rate.pressure);
+    read_pressures(model, rate.pressure);
   }
   return rate;
 }

@@ -61,7 +61,7 @@ class Predictor {
   /// Predictions of the rows of one run that belong to the chains asked for; other rows of `out` stay as they are.
   void predict_run(const ModelPoint& model, std::size_t run, unsigned chains, Eigen::VectorXd& out) const;
   void predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const;
-  /// Does the effect only add a torque of its own, whatever else is in the model?
+  /// Does the effect only add a torque of its own, which no sensor of the force reads by another measure?
   [[nodiscard]] bool adds_up(const ModelPoint& model, const Hypothesis& effect) const noexcept;
   /// What such an effect adds to the rows of its chains; other rows of `out` stay as they are.
   void predict_addition(const ModelPoint& model, const Active& effect, Eigen::VectorXd& out) const;
@@ -88,6 +88,8 @@ class Predictor {
   enum class Reading { kSmooth, kClipped };
   void read_forces(const ModelPoint& model, const PreparedRun& run, Reading which,
                    const std::vector<double>& torque, std::vector<double>& change) const;
+  /// Of one sample, where no sensor has a memory or is clipped.
+  double change_at(const ModelPoint& model, const PreparedRun& run, std::size_t k, double torque) const;
 
   const Prepared* data_;
   int threads_ = 1;

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "isac/explain/predict_parts.hpp"
+#include "isac/explain/slip_moment.hpp"
 
 namespace isac::explain {
 namespace {
@@ -223,11 +224,14 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
 /// goes back and forth between the model where it stands and others that read otherwise; the one that was never asked for again goes first.
 std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
                                                               std::size_t index) const {
+  const PreparedRun& run = data_->runs[index];
   std::vector<double> key;
   for (const Active& a : model.effects) {
     const Hypothesis& h = *a.hypothesis;
     if (!(h.reads_angle || h.reads_pressure || h.info().hook == Hook::kMusclePressure) || is_null(a))
       continue;
+    if (is_slip(h) && !run.time.empty() && time_of(h, run, run.time.size() - 1) < a.values[kSlipMoment])
+      continue;  // it is still to come
     key.push_back(h.effect);
     key.push_back(h.clock == Clock::kDay ? 1 : 0);
     key.insert(key.end(), a.values.begin(), a.values.end());
@@ -324,28 +328,19 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
     const auto& info = a.hypothesis->info();
     const bool reading = a.hypothesis->reads_pressure;
     if ((!reading && info.hook != Hook::kMusclePressure) || is_null(a)) continue;
-    const int e = a.hypothesis->effect;
     for (int i = 0; i < 2; ++i)
       if (in.own_pressure[i].empty()) in.own_pressure[i] = *in.pressure[i];
-    for (std::size_t k = 0; k < in.own_pressure[0].size(); ++k) {
-      double p[2] = {in.own_pressure[0][k], in.own_pressure[1][k]};
-      if (reading) {
-        double truth[2] = {p[0], p[1]};
-        for (int round = 0; round < kInversions; ++round) {
-          models::Readings<double> y;
-          y.pressure[0] = truth[0];
-          y.pressure[1] = truth[1];
-          models::effect_reading(e, a.values.data(), time_of(*a.hypothesis, run, k),
-                                 static_cast<const double*>(nullptr), y);
-          for (int i = 0; i < 2; ++i) truth[i] = p[i] - (y.pressure[i] - truth[i]);
-        }
-        p[0] = truth[0];
-        p[1] = truth[1];
-      } else {
-        models::effect_muscle_pressure(e, a.values.data(), p);
+    if (reading) {
+      const PressureReading made(a);
+      for (int i = 0; i < 2; ++i)
+        for (double& p : in.own_pressure[i]) p = (p - made.constant[i]) / made.slope[i];
+    } else {
+      for (std::size_t k = 0; k < in.own_pressure[0].size(); ++k) {
+        double p[2] = {in.own_pressure[0][k], in.own_pressure[1][k]};
+        models::effect_muscle_pressure(a.hypothesis->effect, a.values.data(), p);
+        in.own_pressure[0][k] = p[0];
+        in.own_pressure[1][k] = p[1];
       }
-      in.own_pressure[0][k] = p[0];
-      in.own_pressure[1][k] = p[1];
     }
     in.pressure[0] = &in.own_pressure[0];
     in.pressure[1] = &in.own_pressure[1];

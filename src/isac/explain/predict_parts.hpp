@@ -38,6 +38,27 @@ namespace isac::explain {
   return 1 + s * growth_of_ramp(s);
 }
 
+/// What a linear effect makes of the pressures' readings, y_i = c_i + s_i p_i, by its values at two points; offsets and gains are all such.
+struct PressureReading {
+  double constant[2], slope[2];
+
+  explicit PressureReading(const Active& a) {
+    const auto read = [&](double pressure) {
+      models::Readings<double> y;
+      y.pressure[0] = y.pressure[1] = pressure;
+      models::effect_reading(a.hypothesis->effect, a.values.data(), 0.0, static_cast<const double*>(nullptr),
+                             y);
+      return y;
+    };
+    constexpr double kFar = 1e6;  // Pa
+    const models::Readings<double> none = read(0), far = read(kFar);
+    for (int i = 0; i < 2; ++i) {
+      constant[i] = none.pressure[i];
+      slope[i] = (far.pressure[i] - none.pressure[i]) / kFar;
+    }
+  }
+};
+
 /// Of the baseline, what effects that bend it need: A, B, C, D.
 struct BaselineOfPoint {
   double stiffness = 0, pressure_gain = 0, cubic_damping = 0, damping = 0;

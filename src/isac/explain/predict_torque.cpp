@@ -21,30 +21,29 @@ constexpr double kRingNoise = 0.02;  // N m, of a sample
 
 /// dz/dt along a path of inputs that is smooth within a sample, by an exponential Rosenbrock–Euler step (exact where the
 /// equation is linear in its state, as Dahl's and the creep's are between reversals) for one state, by RK4 for two.
+/// `Effect`: models::TorqueEffect<E>.
+template <class Effect>
 class Memory {
  public:
   Memory(const Active& active)
-      : active_(active),
-        count_(active.hypothesis->info().state_count),
+      : q_(active.values.data()),
+        dry_(active.hypothesis->dry),
         plays_(active.hypothesis->id() == "backlash") {}
-  void rest(const JointPoint<double>& x) {
-    models::effect_rest(active_.hypothesis->effect, active_.values.data(), x, z_);
-  }
-  const double* state() const { return z_; }
+  void rest(const JointPoint<double>& x) { Effect::rest(q_, x, z_); }
+  double torque(const JointPoint<double>& x) const { return Effect::torque(q_, x, z_); }
   void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
     JointPoint<double> middle = to;
     middle.angle = 0.5 * (from.angle + to.angle);
     middle.velocity = 0.5 * (from.velocity + to.velocity);
     if (plays_) {  // a rate that is on or off would run past the play's end by up to a sample's motion
-      z_[0] = std::clamp(z_[0], to.angle - active_.values[0], to.angle + active_.values[0]);
+      z_[0] = std::clamp(z_[0], to.angle - q_[0], to.angle + q_[0]);
       return;
     }
-    if (count_ == 1) {
+    if constexpr (Effect::kInfo.state_count == 1) {
       // A state that slips at its limit must not run past it within a sample.
       const double first = rate(middle, z_[0]);
       if (first == 0) return;
-      const int parts =
-          active_.hypothesis->dry ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
+      const int parts = dry_ ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
       const double h = dt / parts;
       for (int part = 0; part < parts; ++part) {
         const double f = part == 0 ? first : rate(middle, z_[0]);
@@ -52,31 +51,27 @@ class Memory {
         const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * h;
         z_[0] += h * f * growth(std::min(slope, 5.0));
       }
-      return;
+    } else {
+      double k1[2], k2[2], k3[2], k4[2], y[2];
+      Effect::derivative(q_, from, z_, k1);
+      for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k1[i];
+      Effect::derivative(q_, middle, y, k2);
+      for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k2[i];
+      Effect::derivative(q_, middle, y, k3);
+      for (int i = 0; i < 2; ++i) y[i] = z_[i] + dt * k3[i];
+      Effect::derivative(q_, to, y, k4);
+      for (int i = 0; i < 2; ++i) z_[i] += dt / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
     }
-    const auto f = [&](const double* z, const JointPoint<double>& x, double* dz) {
-      models::effect_derivative(active_.hypothesis->effect, active_.values.data(), x, z, dz);
-    };
-    double k1[2], k2[2], k3[2], k4[2], y[2];
-    f(z_, from, k1);
-    for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k1[i];
-    f(y, middle, k2);
-    for (int i = 0; i < 2; ++i) y[i] = z_[i] + 0.5 * dt * k2[i];
-    f(y, middle, k3);
-    for (int i = 0; i < 2; ++i) y[i] = z_[i] + dt * k3[i];
-    f(y, to, k4);
-    for (int i = 0; i < 2; ++i) z_[i] += dt / 6 * (k1[i] + 2 * k2[i] + 2 * k3[i] + k4[i]);
   }
 
  private:
   double rate(const JointPoint<double>& x, double z) const {
     double dz = 0;
-    models::effect_derivative(active_.hypothesis->effect, active_.values.data(), x, &z, &dz);
+    Effect::derivative(q_, x, &z, &dz);
     return dz;
   }
-  const Active& active_;
-  int count_;
-  bool plays_;
+  const double* q_;
+  bool dry_, plays_;
   double z_[models::kMaxEffectStates] = {};
 };
 
@@ -90,17 +85,17 @@ void add_swing(const Active& active, const Motion& joint, double interval, doubl
     x.acceleration = joint.acceleration[k];
     return x;
   };
-  Memory memory(active);
-  JointPoint<double> x = at(0);
-  memory.rest(x);
-  for (std::size_t k = 0; k < joint.angle.size(); ++k) {
-    const JointPoint<double> next = at(k);
-    if (k > 0) memory.step(x, next, interval);
-    x = next;
-    if (k >= joint.lead)
-      sum[k - joint.lead] +=
-          sign * models::effect_torque(active.hypothesis->effect, active.values.data(), x, memory.state());
-  }
+  models::visit_torque_memory(active.hypothesis->effect, [&](auto effect) {
+    Memory<decltype(effect)> memory(active);
+    JointPoint<double> x = at(0);
+    memory.rest(x);
+    for (std::size_t k = 0; k < joint.angle.size(); ++k) {
+      const JointPoint<double> next = at(k);
+      if (k > 0) memory.step(x, next, interval);
+      x = next;
+      if (k >= joint.lead) sum[k - joint.lead] += sign * memory.torque(x);
+    }
+  });
 }
 
 /// Where what hangs on a compliance stood when a recording began is not known, and it rings from there: c e^{λt}, λ = W (−d ± i √(1 − d²)),
@@ -186,22 +181,44 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
       return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure,
                       time_of(h, run, k), k);
     };
-    JointPoint<double> x = at(0);
     if (h.info().state_count == 0) {
       models::add_effect_torques(
           h.effect, a.values.data(), [&](std::size_t k) { return at(k * every); }, sign, std::span(sum));
       continue;
     }
-    Memory memory(a);
-    memory.rest(x);
-    for (std::size_t k = 0; k < sum.size(); ++k) {
-      const JointPoint<double> next = k == 0 ? x : at(k);
-      if (k > 0) memory.step(x, next, run.interval);
-      x = next;
-      sum[k] += sign * models::effect_torque(h.effect, a.values.data(), x, memory.state());
-    }
+    models::visit_torque_memory(h.effect, [&](auto effect) {
+      Memory<decltype(effect)> memory(a);
+      JointPoint<double> x = at(0);
+      memory.rest(x);
+      for (std::size_t k = 0; k < sum.size(); ++k) {
+        const JointPoint<double> next = k == 0 ? x : at(k);
+        if (k > 0) memory.step(x, next, run.interval);
+        x = next;
+        sum[k] += sign * memory.torque(x);
+      }
+    });
   }
   return sum;
+}
+
+double Predictor::change_at(const ModelPoint& model, const PreparedRun& run, std::size_t k,
+                            double torque) const {
+  if (run.force[0].empty()) return 0;
+  const double r = data_->rig.wheel_radius;
+  double change = 0;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (!h.reads_force || is_null(a)) continue;
+    const double half = 0.5 * (torque + change) / r;
+    models::Readings<double> y;
+    y.force[0] = run.common_force[k] - half;
+    y.force[1] = run.common_force[k] + half;
+    const double before = y.force[1] - y.force[0];
+    models::effect_reading(h.effect, a.values.data(), time_of(h, run, k), static_cast<const double*>(nullptr),
+                           y);
+    change += r * ((y.force[1] - y.force[0]) - before);
+  }
+  return change;
 }
 
 /// What sensors of the force make of a torque: added to `change`. The forces are half of the torque on either side of their

@@ -8,6 +8,7 @@
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/screen.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -21,13 +22,13 @@ constexpr double kBlock = 5;      // s
 constexpr int kFunctions = 29;
 using Functions = Eigen::Matrix<double, kFunctions, 1>;
 
-/// Least squares whose columns may nearly depend on each other.
-Eigen::VectorXd solve(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+/// Least squares whose columns may nearly depend on each other, for each column of y.
+Eigen::MatrixXd solve(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
   const Eigen::VectorXd norm = x.colwise().norm().cwiseMax(1e-12);
   const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
   Eigen::MatrixXd gram = scaled.transpose() * scaled;
   gram.diagonal().array() += 1e-6;
-  return norm.cwiseInverse().asDiagonal() * estimate::solve_symmetric(gram, scaled.transpose() * y);
+  return norm.cwiseInverse().asDiagonal() * estimate::solve_symmetric_each(gram, scaled.transpose() * y);
 }
 
 /// Least squares on the columns that the data bear out: the least certain goes, one at a time, until every column but the first (a
@@ -115,17 +116,17 @@ struct QuietPressure::Parts {
   std::vector<double> rest[2][kBands];  ///< r, by bands
 };
 
-std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data) const {
+std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data, int threads) const {
   std::vector<Parts> all(data.runs.size());
   const Predictor predictor(data);
   ModelPoint model = model_;
   model.base.resize(predictor.base().size());
   const double lag = model_.base.back();
-  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+  share_work(threads, data.runs.size(), [&](std::size_t r) {
     const PreparedRun& run = data.runs[r];
-    if (!run.has_command) continue;
+    if (!run.has_command) return;
     const Predictor::FullRate rate = predictor.full_rate(model, r);
-    if (rate.pressure[0].empty()) continue;
+    if (rate.pressure[0].empty()) return;
     const double sigma = data.smoothing.torque / run.interval;
     for (int i = 0; i < 2; ++i) {
       const Rules rules(run, rate.pressure, lag, i);
@@ -159,18 +160,18 @@ std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data) 
         all[r].rest[i][2][k] = slow[k];
       }
     }
-  }
+  });
   return all;
 }
 
-QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
+QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int threads) {
   QuietPressure quiet;
   if (!data.baseline.terms.empty() || !data.has(Chain::kPressure1) || !data.has(Chain::kPressure2) ||
       !data.has(Chain::kTorque))
     return quiet;
   double pressure_gain = 0;
   {
-    const Predictor predictor(data);
+    const Predictor predictor(data, threads);
     Weights weights;
     weights.sigma[1] = weights.sigma[2] = 150;  // Pa: the chains share nothing, so any scale will do
     const Fit fit = fit_baseline(predictor, {}, weights);
@@ -178,7 +179,9 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
     quiet.model_.rest.clear();
     pressure_gain = fit.model.base[1];
     const double lag = fit.model.base.back();
-    for (int i = 0; i < 2; ++i) {
+    bool learnt[2] = {false, false};
+    share_work(threads, 2, [&](std::size_t valve) {
+      const auto i = static_cast<int>(valve);
       std::vector<Functions> rows;
       std::vector<double> off;
       std::vector<std::size_t> block;
@@ -204,19 +207,20 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
             off.push_back((run.smooth_pressure[i][k] - predicted[k]) / kPascalPerKgfCm2);
           }
       }
-      if (rows.size() < 20 * kFunctions) return quiet;
+      if (rows.size() < 20 * kFunctions) return;
       Eigen::MatrixXd x(static_cast<Eigen::Index>(rows.size()), kFunctions);
       for (std::size_t n = 0; n < rows.size(); ++n) x.row(static_cast<Eigen::Index>(n)) = rows[n];
       quiet.by_rule_[i] =
           solve_significant(x, Eigen::Map<const Eigen::VectorXd>(off.data(), x.rows()), block);
-      if (!quiet.by_rule_[i].allFinite()) return quiet;
-    }
+      learnt[i] = quiet.by_rule_[i].allFinite();
+    });
+    if (!learnt[0] || !learnt[1]) return quiet;
   }
-  const std::vector<Parts> parts = quiet.parts_of(data);
+  const std::vector<Parts> parts = quiet.parts_of(data, threads);
   const std::vector<PreparedRun> read = data.runs;  // should the torque tell nothing
   quiet.known_ = true;
   quiet.felt_ = {0, 0, 0};
-  quiet.apply(data);
+  quiet.apply(data, parts);
 
   // Torque = its base, generic functions of quiet signals, and the bands.
   const Dictionary generic(data);
@@ -245,8 +249,11 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
   x.col(x.cols() - 1) = cubed;
   const bool enough = n > 20 * (x.cols() + kBands);
   if (enough) {
-    for (int b = 0; b < kBands; ++b) bands.col(b) -= x * solve(x, bands.col(b));
-    y -= x * solve(x, y);
+    Eigen::MatrixXd of(n, kBands + 1);
+    of << bands, y;
+    of -= x * solve(x, of);
+    bands = of.leftCols(kBands);
+    y = of.col(kBands);
     const Eigen::VectorXd felt = solve(bands, y), left = y - bands * felt;
     for (int b = 0; b < kBands; ++b) {
       // Scatter of its score over blocks of time.
@@ -265,13 +272,15 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known) {
     quiet.felt_ = {1, 1, 1};
   }
   data.runs = read;
-  quiet.apply(data);
+  quiet.apply(data, parts);
   return quiet;
 }
 
 void QuietPressure::apply(Prepared& data) const {
-  if (!known_) return;
-  const std::vector<Parts> parts = parts_of(data);
+  if (known_) apply(data, parts_of(data, 1));
+}
+
+void QuietPressure::apply(Prepared& data, const std::vector<Parts>& parts) const {
   for (std::size_t r = 0; r < data.runs.size(); ++r)
     for (int i = 0; i < 2; ++i) {
       const Parts& part = parts[r];

@@ -27,14 +27,15 @@ class QuietPressure {
   QuietPressure() = default;
   /// Learns it on the runs that are fitted, and changes their pressures (PreparedRun::pressure). `known`: a model of the valves that is
   /// better than their lag alone; its effects' hypotheses must outlive the result.
-  static QuietPressure learn(Prepared& data, const ModelPoint* known = nullptr);
+  static QuietPressure learn(Prepared& data, const ModelPoint* known = nullptr, int threads = 1);
   /// Changes the pressures of other runs of the same rig.
   void apply(Prepared& data) const;
   [[nodiscard]] const std::array<double, kBands>& felt() const noexcept { return felt_; }
 
  private:
   struct Parts;
-  [[nodiscard]] std::vector<Parts> parts_of(const Prepared& data) const;
+  [[nodiscard]] std::vector<Parts> parts_of(const Prepared& data, int threads) const;
+  void apply(Prepared& data, const std::vector<Parts>& parts) const;
   [[nodiscard]] double error_of_mean(const Parts& parts, const PreparedRun& run) const;
 
   ModelPoint model_;            ///< of the rough fit: K_C, T_C

@@ -91,7 +91,7 @@ void Search::hold_against_a_step() {
 
 void Search::hold_against_functions() {
   const Around baseline = around(predictor_, found_.baseline, found_.weights);
-  const GenericFit generic = fit_generic(baseline, found_.steps.front().screen);
+  const GenericFit generic = fit_generic(baseline, found_.steps.front().screen, options_.threads);
   if (generic.functions.empty()) return;
   std::string names;
   int parameters = 0;

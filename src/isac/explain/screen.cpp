@@ -71,6 +71,16 @@ SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
   return best;
 }
 
+/// So many columns of doubles are few beside what a search keeps as floats, and so many tasks leave no thread without work.
+std::size_t shapes_at_once(const Hypothesis& h) {
+  constexpr std::size_t kColumns = 16;
+  return h.shapes.empty() ? 1 : std::max<std::size_t>(1, kColumns / directions(h, h.shapes.front()).size());
+}
+
+std::size_t parts_of(const Hypothesis& h) {
+  return (h.shapes.size() + shapes_at_once(h) - 1) / shapes_at_once(h);
+}
+
 /// Rows of one chain in one atom, one after another.
 struct Stretch {
   Eigen::Index from = 0, rows = 0, atom = 0, run = 0;
@@ -130,31 +140,35 @@ class Screening {
 
   std::size_t functions() const { return generic_.size(); }
 
-  /// All shapes of a hypothesis.
-  Done effect(int hypothesis) const {
+  /// Shapes of a hypothesis, one part of them.
+  Done effect(int hypothesis, std::size_t part) const {
     const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(hypothesis)];
+    const std::size_t at_once = shapes_at_once(h), first_shape = part * at_once,
+                      last_shape = std::min(first_shape + at_once, h.shapes.size());
     std::vector<std::vector<Values>> ways;
     Eigen::Index columns = 0;
-    for (const Values& shape : h.shapes) {
-      ways.push_back(directions(h, shape));
+    for (std::size_t s = first_shape; s < last_shape; ++s) {
+      ways.push_back(directions(h, h.shapes[s]));
       columns += static_cast<Eigen::Index>(ways.back().size());
     }
-    Eigen::MatrixXd x = rows_of(h, hypothesis, ways, columns);
+    Eigen::MatrixXd x = rows_of(h, hypothesis, part, ways, columns);
     const Eigen::VectorXd raw = x.colwise().squaredNorm();
     x = place_.project_columns(x);
+    const Eigen::MatrixXd plain = unfiltered_each(data_, *place_.weights, x);
     Done done;
     Eigen::Index first = 0;
-    for (std::size_t s = 0; s < ways.size(); ++s) {
-      const auto m = static_cast<Eigen::Index>(ways[s].size());
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+      const auto m = static_cast<Eigen::Index>(ways[i].size());
       std::vector<Column> of_shape;
       for (Eigen::Index a = 0; a < m; ++a) {
-        Column c = summary(x.col(first + a), raw[first + a], kMimicked);
+        Column c = summary(x.col(first + a), plain.col(first + a), raw[first + a], kMimicked);
         c.hypothesis = hypothesis;
-        c.shape = static_cast<int>(s);
+        c.shape = static_cast<int>(first_shape + i);
         c.amplitude = static_cast<int>(a);
         of_shape.push_back(std::move(c));
       }
-      done.shapes.push_back(linear_fit(h, h.shapes[s], ways[s], of_shape, x.middleCols(first, m)));
+      done.shapes.push_back(
+          linear_fit(h, h.shapes[first_shape + i], ways[i], of_shape, x.middleCols(first, m)));
       for (Column& c : of_shape) done.columns.push_back(std::move(c));
       first += m;
     }
@@ -164,24 +178,32 @@ class Screening {
   /// Functions `first` to `last` of the dictionary.
   Done dictionary(std::size_t first, std::size_t last) const {
     Eigen::MatrixXd x(rows(), static_cast<Eigen::Index>(last - first));
+    std::vector<Eigen::Index> fresh;
     for (std::size_t d = first; d < last; ++d) {
       const auto column = static_cast<Eigen::Index>(d - first);
-      Eigen::VectorXf* known = kept_ != nullptr ? &kept_->function(d) : nullptr;
+      const Eigen::VectorXf* known = kept_ != nullptr ? &kept_->function(d) : nullptr;
       if (known != nullptr && known->size() > 0) {
         x.col(column) = known->cast<double>();
         continue;
       }
-      Eigen::VectorXd values = generic_.rows(d);
-      weigh(data_, *place_.weights, values);
-      if (known != nullptr) *known = values.cast<float>();
-      x.col(column) = values;
+      x.col(column) = generic_.rows(d);
+      fresh.push_back(column);
+    }
+    if (!fresh.empty()) {
+      Eigen::MatrixXd weighed = x(Eigen::all, fresh);
+      weigh(data_, *place_.weights, weighed);
+      x(Eigen::all, fresh) = weighed;
+      for (const Eigen::Index column : fresh)
+        if (kept_ != nullptr)
+          kept_->function(first + static_cast<std::size_t>(column)) = x.col(column).cast<float>();
     }
     const Eigen::VectorXd raw = x.colwise().squaredNorm();
     x = place_.project_columns(x);
+    const Eigen::MatrixXd plain = unfiltered_each(data_, *place_.weights, x);
     Done done;
     for (std::size_t d = first; d < last; ++d) {
       const auto column = static_cast<Eigen::Index>(d - first);
-      done.columns.push_back(summary(x.col(column), raw[column], kMimickedFunction));
+      done.columns.push_back(summary(x.col(column), plain.col(column), raw[column], kMimickedFunction));
       done.columns.back().name = generic_.name(d);
       done.columns.back().chain = generic_.chain(d);
     }
@@ -192,25 +214,27 @@ class Screening {
   Eigen::Index rows() const { return static_cast<Eigen::Index>(data_.rows.size()); }
 
   /// Weighted responses to every way, side by side.
-  Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, const std::vector<std::vector<Values>>& ways,
-                          Eigen::Index columns) const {
+  Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, std::size_t part,
+                          const std::vector<std::vector<Values>>& ways, Eigen::Index columns) const {
     Eigen::MatrixXf* known =
-        kept_ != nullptr && Responses::hold(*place_.fit, h) ? &kept_->effect(hypothesis) : nullptr;
+        kept_ != nullptr && Responses::hold(*place_.fit, h) ? &kept_->effect(hypothesis, part) : nullptr;
     if (known != nullptr && known->cols() == columns) return known->cast<double>();
     Eigen::MatrixXd x(rows(), columns);
     Eigen::Index column = 0;
     for (const std::vector<Values>& of_shape : ways)
       for (const Values& way : of_shape) {
-        x.col(column) = response(*place_.predictor, *place_.fit, place_.here, {&h, way}, *place_.weights);
+        x.col(column) = change(*place_.predictor, *place_.fit, place_.here, {&h, way});
         if (!x.col(column).allFinite()) x.col(column).setZero();
         ++column;
       }
+    weigh(data_, *place_.weights, x);
     if (known != nullptr) *known = x.cast<float>();
     return x;
   }
 
   /// Scores of a projected response against the residual.
-  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, double raw_norm2, double mimicked) const {
+  Column summary(const Eigen::Ref<const Eigen::VectorXd>& x, const Eigen::Ref<const Eigen::VectorXd>& plain,
+                 double raw_norm2, double mimicked) const {
     const auto atoms = static_cast<Eigen::Index>(data_.atoms);
     Column column;
     column.raw_norm2 = raw_norm2;
@@ -236,7 +260,6 @@ class Screening {
       count = 0;
     }
     if (place_.weights->is_coloured()) {
-      const Eigen::VectorXd plain = unfiltered(data_, *place_.weights, x);
       for (const Stretch& s : stretches_)
         column.plain_norm2[s.chain] += plain.segment(s.from, s.rows).squaredNorm();
     } else {
@@ -337,13 +360,15 @@ bool Responses::hold(const Fit& fit, const Hypothesis& h) noexcept {
   const bool smooth_torque = h.info().hook == models::Hook::kTorque && !h.dry;
   return std::none_of(fit.model.effects.begin() + static_cast<std::ptrdiff_t>(fit.tolerances),
                       fit.model.effects.end(), [&](const Active& a) {
-                        return smooth_torque ? a.hypothesis->reads_force
+                        return smooth_torque ? a.hypothesis->reads_force && !a.hypothesis->shifts_force
                                              : (a.hypothesis->chains & h.chains) != 0;
                       });
 }
 
-Eigen::MatrixXf& Responses::effect(int hypothesis) {
-  return effects_[static_cast<std::size_t>(hypothesis)];
+void Responses::make_room(const Library& library, std::size_t functions) {
+  effects_.resize(library.hypotheses.size());
+  for (std::size_t h = 0; h < effects_.size(); ++h) effects_[h].resize(parts_of(library.hypotheses[h]));
+  functions_.resize(functions);
 }
 
 Eigen::VectorXd error_of_means(const Around& place) {
@@ -412,8 +437,9 @@ Screen screen(const Around& place, const Library& library, const ScreenOptions& 
   for (std::size_t h = 0; h < library.hypotheses.size(); ++h)
     if (have[h] == 0 && asked(library.hypotheses[h]) && !taken_up(library.hypotheses[h]) &&
         !library.hypotheses[h].shapes.empty())
-      tasks.emplace_back([&screening, h] { return screening.effect(static_cast<int>(h)); });
-  if (kept != nullptr) kept->make_room(library.hypotheses.size(), screening.functions());
+      for (std::size_t part = 0; part < parts_of(library.hypotheses[h]); ++part)
+        tasks.emplace_back([&screening, h, part] { return screening.effect(static_cast<int>(h), part); });
+  if (kept != nullptr) kept->make_room(library, screening.functions());
   for (std::size_t d = 0; options.dictionary && !has_dictionary && d < screening.functions(); d += kTogether)
     tasks.emplace_back(
         [&screening, d] { return screening.dictionary(d, std::min(d + kTogether, screening.functions())); });

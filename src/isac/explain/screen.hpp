@@ -92,16 +92,16 @@ struct ScreenOptions {
 /// beside whatever was added.
 class Responses {
  public:
-  void make_room(std::size_t hypotheses, std::size_t functions) {
-    effects_.resize(hypotheses);
-    functions_.resize(functions);
-  }
-  /// May a hypothesis' response be kept, or taken, beside this model? A smooth torque's not where forces are read differently. Dry friction
+  void make_room(const Library& library, std::size_t functions);
+  /// May a hypothesis' response be kept, or taken, beside this model? A smooth torque's not where forces are read differently, but for a
+  /// shift. Dry friction
   /// turns at samples that a tolerance of the angle's clock moves, and an addition moves the tolerances: its response, like a valve's or a
   /// reading's, not where anything was added to its rows. (Coulomb friction's own, kept, stood beside its own sensitivity with T = 3.)
   [[nodiscard]] static bool hold(const Fit& fit, const Hypothesis& hypothesis) noexcept;
-  /// Rows × all amplitudes of all shapes; empty: not known yet.
-  [[nodiscard]] Eigen::MatrixXf& effect(int hypothesis);
+  /// Rows × all amplitudes of one part of its shapes; empty: not known yet.
+  [[nodiscard]] Eigen::MatrixXf& effect(int hypothesis, std::size_t part) {
+    return effects_[static_cast<std::size_t>(hypothesis)][part];
+  }
   [[nodiscard]] Eigen::VectorXf& function(std::size_t column) { return functions_[column]; }
   void forget() {
     effects_.clear();
@@ -109,7 +109,7 @@ class Responses {
   }
 
  private:
-  std::vector<Eigen::MatrixXf> effects_;
+  std::vector<std::vector<Eigen::MatrixXf>> effects_;
   std::vector<Eigen::VectorXf> functions_;
 };
 
@@ -157,7 +157,8 @@ struct FlipTest {
   double limit = 0;  ///< that the largest T of noise passes with the probability asked for
 };
 [[nodiscard]] FlipTest flip_test(const Eigen::MatrixXd& block_scores, int flips, std::uint64_t seed,
-                                 double significance, std::optional<double> observed = std::nullopt);
+                                 double significance, std::optional<double> observed = std::nullopt,
+                                 int threads = 1);
 
 /// Generic functions of the measured signals, one column each: what an unknown effect may look like.
 class Dictionary {
@@ -182,7 +183,7 @@ class Dictionary {
 /// The functions of all chains, at hand for one residual after another; 8 bytes for each row and function.
 class GenericFunctions {
  public:
-  explicit GenericFunctions(const Prepared& data);
+  explicit GenericFunctions(const Prepared& data, int threads = 1);
   /// A residual without what the functions can make of it, chain by chain: mostly noise, whatever is missing. Chains of fewer than twenty
   /// rows for each function stay as they are.
   [[nodiscard]] Eigen::VectorXd beside(const Eigen::VectorXd& residual) const;

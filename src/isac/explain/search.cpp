@@ -123,7 +123,7 @@ void Search::forward() {
   left_elsewhere_ = false;
   take_settled();
   for (;;) {
-    const bool narrow = !found_.added.empty() && !look_.contenders.empty();
+    const bool narrow = !look_.contenders.empty();
     if (narrow) asked_for_ = look_.contenders;
     Step step = step_here();
     asked_for_.reset();
@@ -133,7 +133,11 @@ void Search::forward() {
       step = step_here();
       narrow_.reset();
     }
-    if (found_.steps.empty()) found_.gate = step.gate;
+    if (found_.steps.empty()) {
+      found_.gate = step.gate;
+      // Of what stood near the top once, the largest is larger by chance than of all that were looked for then.
+      if (narrow) found_.gate.p_value = std::max(step.gate.p_value, look_.gate.p_value);
+    }
     const bool open = is_open(step);
     say(open ? fmt::format("{} is missing: p = {:.2g}, {:.2f} of the noise floor, most like {} ({} blocks "
                            "of {:.1f} s)",

@@ -52,10 +52,10 @@ struct Found {
 /// Which of two looks at the same data a search is.
 struct Look {
   bool provisional = false;  ///< may end early (Found::worth_another_look)
-  /// Of an earlier look that ended early: beside an effect these are screened first, all others before anything is said to be left over.
+  /// Of an earlier look that ended early: these are screened first, all others before nothing is said to be left over.
   std::set<std::string> contenders;
   std::vector<Step> settled;  ///< its steps that need not be taken again; of a library of the same hypotheses
-  Gate gate;                  ///< of the baseline, where steps are settled
+  Gate gate;                  ///< of the baseline, by that look
   Weights weights;            ///< of that look, whose colour of the pressures stands
   bool colour_beside_best = false;  ///< its noise's colour was read off beside an effect
   /// What it found, of a library of the same hypotheses: beside it the colour is read off where it had to be read off beside an effect.

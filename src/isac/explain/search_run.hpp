@@ -196,7 +196,10 @@ class Search {
   Ranking ranking_;
   Plausible plausible_;
   Found found_;
-  Around place_;                                    ///< of found_.model
+  Around place_;  ///< of found_.model
+  std::optional<Trial>
+      first_here_;        ///< what the best of a screen of this place came to when it was refitted, from…
+  Values first_start_{};  ///< …here
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   std::optional<Screen> narrow_;                    ///< of this place, that was asked for some ids only
   Responses responses_;

@@ -48,18 +48,18 @@ ScreenOptions Search::screen_options() const {
 }
 
 Eigen::VectorXd Search::beside_functions(const Eigen::VectorXd& rows) const {
-  if (!functions_) functions_.emplace(data_);
+  if (!functions_) functions_.emplace(data_, options_.threads);
   return functions_->beside(rows);
 }
 
 void Search::move_to(const Fit& fit) {
   found_.model = fit;
   place_ = around(predictor_, found_.model, found_.weights);
+  first_here_.reset();
 }
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
   take_colours(data_, beside_functions(left_over), found_.weights);
-  functions_.reset();            // 40 MB that a screen has better use for
   if (!look_.settled.empty()) {  // the pressures' own has been read off already
     for (const Chain c : {Chain::kPressure1, Chain::kPressure2})
       found_.weights.colour[static_cast<int>(c)] = look_.weights.colour[static_cast<int>(c)];
@@ -80,7 +80,6 @@ bool Search::no_zero_wanders_beside_it() {
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
   Weights weights = found_.weights;
   take_colours(data_, beside_functions(rows), weights);
-  functions_.reset();
   if (a_zero_wanders(weights)) return false;
   say("beside it the force sensors' zero does not wander: once more with one that stands still");
   colour_beside_best_ = true;
@@ -96,7 +95,6 @@ bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, step.trials.front().residual);
   Weights weights = found_.weights;
   take_colours(data_, beside_functions(rows), weights);
-  functions_.reset();
   if (!a_zero_wanders(weights)) return false;
   say(ranking_.id_of(step.trials.front()) +
       " had hidden that the force sensors' zero wanders: once more beside it");
@@ -121,18 +119,19 @@ Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
     if (c.gain > kLargeForSure * s.noise_unit && large.size() < kColours &&
         seen.insert(library_.hypotheses[static_cast<std::size_t>(c.hypothesis)].id()).second)
       large.push_back(c);
-  Eigen::VectorXd best;
-  double most = -std::numeric_limits<double>::infinity();
-  for (const Trial& t : refit_all(large)) {
-    const Eigen::VectorXd rows = unfiltered(data_, found_.weights, t.residual);
+  const std::vector<Trial> trials = refit_all(large);
+  if (trials.empty()) return {};
+  std::vector<Eigen::VectorXd> rows(trials.size());
+  std::vector<double> likelihood(trials.size());
+  (void)beside_functions(trials.front().residual);  // they are made once, and not by two threads
+  share_work(options_.threads, trials.size(), [&](std::size_t i) {
+    rows[i] = unfiltered(data_, found_.weights, trials[i].residual);
     Weights weights = found_.weights;
-    take_colours(data_, beside_functions(rows), weights);
-    const double here = log_likelihood(data_, weights, rows);
-    if (here <= most) continue;
-    most = here;
-    best = rows;
-  }
-  return best;
+    take_colours(data_, beside_functions(rows[i]), weights);
+    likelihood[i] = log_likelihood(data_, weights, rows[i]);
+  });
+  return rows[static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) -
+                                       likelihood.begin())];
 }
 
 Screen Search::screen_here() {
@@ -142,6 +141,8 @@ Screen Search::screen_here() {
   const Screened first = s.candidates.front();
   const double before = data_.block_seconds;
   const std::vector<Trial> best = refit_all({first});
+  first_here_ = best.front();
+  first_start_ = first.start;
   choose_blocks(best.front().residual);
   if (data_.block_seconds > before) cut_blocks(data_, before);
   const bool large_and_not_found = !is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit;
@@ -216,6 +217,10 @@ void Search::choose_moment(Step& step) const {
 std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
   std::vector<Trial> trials(list.size());
   share_work(options_.threads, list.size(), [&](std::size_t i) {
+    if (first_here_ && first_here_->hypothesis == list[i].hypothesis && first_start_ == list[i].start) {
+      trials[i] = *first_here_;
+      return;
+    }
     const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
     Refined refined = refine(place_, h, list[i].start);
     // Where the linear start was a bad one, the shape's own values are another.
@@ -318,7 +323,7 @@ void Search::leave_to_slow_noise(Step& step) {
 }
 
 double Search::units_of_functions(const Step& step) const {
-  const GenericFit generic = fit_generic(place_, step.screen);
+  const GenericFit generic = fit_generic(place_, step.screen, options_.threads);
   if (generic.functions.empty()) return 0;
   const double unit =
       compare(data_, generic.residual, place_.residual, 0, noise_density(data_, generic.residual)).unit;

@@ -119,43 +119,95 @@ std::shared_ptr<const NoiseFilter> filter_of(const Prepared& data, const Weights
 
 }  // namespace
 
-void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::VectorXd> rows) {
-  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
-  double m1 = 0, m2 = 0;
-  std::vector<double> zero(filter && weights.one_zero ? data.rows.size() : 0);
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    double& y = rows[static_cast<Eigen::Index>(i)];
-    y /= weights.sigma[static_cast<int>(data.rows[i].chain)];
-    if (!filter) continue;
-    const NoiseFilter::Gains& g = filter->gains[i];
-    m1 *= g.stay1;
-    m2 *= g.stay2;
-    const double innovation = y - filter->shared(i, zero) - m1 - m2;
-    m1 += g.gain1 * innovation;
-    m2 += g.gain2 * innovation;
-    if (!zero.empty()) zero[i] = m2;
-    y = g.scale * innovation;
+namespace {
+
+/// What the filter remembers of N columns side by side: one column's next row waits for its last, and not for the others'.
+template <int N>
+struct Memories {
+  double m1[N] = {}, m2[N] = {};
+  std::vector<double> zero[N];
+
+  Memories(std::size_t rows, bool one_zero) {
+    for (auto& z : zero) z.resize(one_zero ? rows : 0);
   }
+  /// `step(column, what is known of the row beforehand)` is the row's innovation.
+  template <class Step>
+  void take(const NoiseFilter& filter, std::size_t row, const Step& step) {
+    const NoiseFilter::Gains& g = filter.gains[row];
+    for (int c = 0; c < N; ++c) {
+      m1[c] *= g.stay1;
+      m2[c] *= g.stay2;
+      const double innovation = step(c, filter.shared(row, zero[c]), m1[c], m2[c], g.scale);
+      m1[c] += g.gain1 * innovation;
+      m2[c] += g.gain2 * innovation;
+      if (!zero[c].empty()) zero[c][row] = m2[c];
+    }
+  }
+};
+
+template <int N>
+void weigh_some(const Prepared& data, const Weights& weights, const NoiseFilter* filter,
+                Eigen::Ref<Eigen::MatrixXd> columns) {
+  double* y[N];
+  for (int c = 0; c < N; ++c) y[c] = columns.col(c).data();
+  Memories<N> memories(data.rows.size(), filter != nullptr && weights.one_zero);
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const double sigma = weights.sigma[static_cast<int>(data.rows[i].chain)];
+    for (int c = 0; c < N; ++c) y[c][i] /= sigma;
+    if (filter == nullptr) continue;
+    memories.take(*filter, i, [&](int c, double shared, double m1, double m2, double scale) {
+      const double innovation = y[c][i] - shared - m1 - m2;
+      y[c][i] = scale * innovation;
+      return innovation;
+    });
+  }
+}
+
+template <int N>
+void unfilter_some(const Prepared& data, const Weights& weights, const NoiseFilter& filter,
+                   Eigen::Ref<Eigen::MatrixXd> columns) {
+  double* e[N];
+  for (int c = 0; c < N; ++c) e[c] = columns.col(c).data();
+  Memories<N> memories(data.rows.size(), weights.one_zero);
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    memories.take(filter, i, [&](int c, double shared, double m1, double m2, double scale) {
+      const double innovation = e[c][i] / scale;
+      e[c][i] = shared + m1 + m2 + innovation;
+      return innovation;
+    });
+}
+
+/// Calls work.operator()<N>(first column) for groups of four columns, and of one for what is left.
+template <class Work>
+void in_groups(Eigen::Index columns, const Work& work) {
+  Eigen::Index c = 0;
+  for (; c + 4 <= columns; c += 4) work.template operator()<4>(c);
+  for (; c < columns; ++c) work.template operator()<1>(c);
+}
+
+}  // namespace
+
+void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns) {
+  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
+  in_groups(columns.cols(), [&]<int N>(Eigen::Index first) {
+    weigh_some<N>(data, weights, filter.get(), columns.middleCols(first, N));
+  });
 }
 
 Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights, const Eigen::VectorXd& weighted) {
   const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
-  if (!filter) return weighted;
   Eigen::VectorXd rows = weighted;
-  double m1 = 0, m2 = 0;
-  std::vector<double> zero(weights.one_zero ? data.rows.size() : 0);
-  for (std::size_t i = 0; i < data.rows.size(); ++i) {
-    double& e = rows[static_cast<Eigen::Index>(i)];
-    const NoiseFilter::Gains& g = filter->gains[i];
-    m1 *= g.stay1;
-    m2 *= g.stay2;
-    const double innovation = e / g.scale, before = filter->shared(i, zero) + m1 + m2;
-    m1 += g.gain1 * innovation;
-    m2 += g.gain2 * innovation;
-    if (!zero.empty()) zero[i] = m2;
-    e = before + innovation;
-  }
+  if (filter) unfilter_some<1>(data, weights, *filter, rows);
   return rows;
+}
+
+Eigen::MatrixXd unfiltered_each(const Prepared& data, const Weights& weights, Eigen::MatrixXd weighted) {
+  const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
+  if (!filter) return weighted;
+  in_groups(weighted.cols(), [&]<int N>(Eigen::Index first) {
+    unfilter_some<N>(data, weights, *filter, weighted.middleCols(first, N));
+  });
+  return weighted;
 }
 
 Eigen::VectorXd without_shared_zero(const Prepared& data, const Weights& weights, Eigen::VectorXd rows) {

@@ -44,14 +44,17 @@ struct Weights {
   [[nodiscard]] bool is_coloured() const noexcept;
 };
 
-/// Rows in the chains' units → weighted rows e.
-void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::VectorXd> rows);
+/// Rows in the chains' units → weighted rows e, each column by itself.
+void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns);
 /// Rows r/σ of which those of the motion have lost the zero that the torque's rows tell of.
 [[nodiscard]] Eigen::VectorXd without_shared_zero(const Prepared& data, const Weights& weights,
                                                   Eigen::VectorXd rows);
 /// Weighted rows e → r/σ, as they are in time.
 [[nodiscard]] Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights,
                                          const Eigen::VectorXd& weighted);
+/// The same of each column.
+[[nodiscard]] Eigen::MatrixXd unfiltered_each(const Prepared& data, const Weights& weights,
+                                              Eigen::MatrixXd weighted);
 
 /// Noise of one chain from a residual r/σ that holds little else: the slow part from the autocovariance beyond the kernel's
 /// reach, the white part from what is left within it.

@@ -94,6 +94,10 @@ void share_work(int threads, std::size_t count, const std::function<void(std::si
   Job job;
   job.work = &work;
   job.count = count;
+  if (count == 1) {  // what it shares in its turn may still be shared
+    work(0);
+    return;
+  }
   const bool outermost = !within;
   within = true;
   if (helpers == 0 || !outermost || !workers.serve(job, helpers)) job.run();

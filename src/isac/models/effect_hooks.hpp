@@ -17,6 +17,8 @@
 /// Example: `effect_pressure_rate(find_effect("leak"), &per_second, point, nullptr, rates)`.
 #pragma once
 
+#include <type_traits>
+
 #include "isac/models/effects.hpp"
 
 namespace isac::models {
@@ -216,6 +218,75 @@ void effect_reading_rest(int effect, const S* parameters, const Readings<S>& rea
   if (!Catalogue::holds(effect)) return;
   Catalogue::kTable<detail::RestAtCall<S, Readings<S>>>[static_cast<unsigned>(effect)](parameters, readings,
                                                                                        state);
+}
+
+/// An effect of the valve unit with the functions above, looked up by its index at each call.
+struct AnyValveEffect {
+  int effect = -1;
+
+  [[nodiscard]] int state_count() const noexcept {
+    return Catalogue::holds(effect) ? Catalogue::kInfos[effect].state_count : 0;
+  }
+  template <class S>
+  void command(const S* q, const ValvePoint<S>& x, const S* z, S* u) const noexcept {
+    effect_command(effect, q, x, z, u);
+  }
+  template <class S>
+  void pressure_rate(const S* q, const ValvePoint<S>& x, const S* z, S* v) const noexcept {
+    effect_pressure_rate(effect, q, x, z, v);
+  }
+  template <class S>
+  void derivative(const S* q, const ValvePoint<S>& x, const S* u, const S* v, const S* z,
+                  S* dz) const noexcept {
+    effect_valve_derivative(effect, q, x, u, v, z, dz);
+  }
+  template <class S>
+  void step(const S* q, const ValvePoint<S>& x, S* z) const noexcept {
+    effect_valve_step(effect, q, x, z);
+  }
+};
+
+/// The same, of a type that the compiler knows.
+template <class E>
+struct ValveEffect {
+  [[nodiscard]] static constexpr int state_count() noexcept { return E::kInfo.state_count; }
+  template <class S>
+  static void command(const S* q, const ValvePoint<S>& x, const S* z, S* u) noexcept {
+    detail::CommandCall<S>::template call<E>(q, x, z, u);
+  }
+  template <class S>
+  static void pressure_rate(const S* q, const ValvePoint<S>& x, const S* z, S* v) noexcept {
+    detail::PressureRateCall<S>::template call<E>(q, x, z, v);
+  }
+  template <class S>
+  static void derivative(const S* q, const ValvePoint<S>& x, const S* u, const S* v, const S* z,
+                         S* dz) noexcept {
+    detail::ValveDerivativeCall<S>::template call<E>(q, x, u, v, z, dz);
+  }
+  template <class S>
+  static void step(const S* q, const ValvePoint<S>& x, S* z) noexcept {
+    detail::StepCall<S, ValvePoint<S>>::template call<E>(q, x, z);
+  }
+};
+
+namespace detail {
+
+template <class Visitor>
+struct ValveVisit {
+  template <class E>
+  static void call(Visitor& visitor) {
+    if constexpr (E::kInfo.where == Subsystem::kPcu) visitor(ValveEffect<E>{});
+  }
+};
+
+}  // namespace detail
+
+/// Calls `visitor` with the ValveEffect of this index, for a loop that is compiled for it; does nothing for effects of another place.
+template <class Visitor>
+void visit_valve_effect(int effect, Visitor&& visitor) {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::ValveVisit<std::remove_reference_t<Visitor>>>[static_cast<unsigned>(effect)](
+      visitor);
 }
 
 }  // namespace isac::models

@@ -20,6 +20,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 #include "isac/models/effect_types.hpp"
 #include "isac/models/effects_friction.hpp"
@@ -131,6 +132,45 @@ template <class S>
 void effect_rest(int effect, const S* parameters, const JointPoint<S>& point, S* state) noexcept {
   if (!Catalogue::holds(effect)) return;
   Catalogue::kTable<detail::RestCall<S>>[static_cast<unsigned>(effect)](parameters, point, state);
+}
+
+/// A torque effect of a type that the compiler knows, with the functions above.
+template <class E>
+struct TorqueEffect {
+  static constexpr const EffectInfo& kInfo = E::kInfo;
+  template <class S>
+  [[nodiscard]] static S torque(const S* q, const JointPoint<S>& x, const S* z) noexcept {
+    return detail::TorqueCall<S>::template call<E>(q, x, z);
+  }
+  template <class S>
+  static void derivative(const S* q, const JointPoint<S>& x, const S* z, S* dz) noexcept {
+    detail::DerivativeCall<S>::template call<E>(q, x, z, dz);
+  }
+  template <class S>
+  static void rest(const S* q, const JointPoint<S>& x, S* z) noexcept {
+    detail::RestCall<S>::template call<E>(q, x, z);
+  }
+};
+
+namespace detail {
+
+template <class Visitor>
+struct TorqueVisit {
+  template <class E>
+  static void call(Visitor& visitor) {
+    if constexpr (E::kInfo.hook == Hook::kTorque && E::kInfo.state_count > 0) visitor(TorqueEffect<E>{});
+  }
+};
+
+}  // namespace detail
+
+/// Calls `visitor` with the TorqueEffect of this index, for a loop that is compiled for it; does nothing for effects without states, for which
+/// there is add_effect_torques, and for those of another hook.
+template <class Visitor>
+void visit_torque_memory(int effect, Visitor&& visitor) {
+  if (!Catalogue::holds(effect)) return;
+  Catalogue::kTable<detail::TorqueVisit<std::remove_reference_t<Visitor>>>[static_cast<unsigned>(effect)](
+      visitor);
 }
 
 }  // namespace isac::models
