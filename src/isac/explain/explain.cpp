@@ -216,6 +216,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     Look again;
     again.contenders = std::move(found.contenders);
     again.gate = found.gate;
+    again.another_pair = found.another_pair;
     if (same_hypotheses(*first_library, *library_here)) {
       again.settled = std::move(found.settled);
       again.weights = found.weights;

@@ -72,6 +72,8 @@ GenericFit fit_generic(const Around& place, const StandingOut& among, double noi
     fit.residual -= unit.dot(fit.residual) * unit;
     for (GenericRows& e : entries) e.rows -= unit.dot(e.rows) * unit;
   }
+  // Beside a name, tolerances that were held at a bound come back: beside functions as well.
+  if (!fit.functions.empty()) fit.residual = place.release(std::move(fit.residual));
   return fit;
 }
 

@@ -15,10 +15,11 @@ namespace {
 
 constexpr double kBeaten = 1.645;  // sigma, by functions without a name
 // Sigma more than chance has seldom: were the name right, functions would be half of what lies between the two behind.
-constexpr double kCloserThanChance = 1.645;
+constexpr double kCloserThanChance = 1.28;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
+constexpr double kDoubtfulOfAPair = 0.1;  // of two that took the place of one which would nearly have done
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
                  kWorthDoubtingOfPressureIfSeldom = 0.015;
@@ -168,7 +169,9 @@ void Search::look_at_remainder() {
   const bool much = left.size >= (pressure ? of_pressure : of_torque) * first_size_,
              much_elsewhere = data_.baseline.terms.empty() && p <= kSeldom &&
                               gate.size >= kWorthDoubtingOfAny * first_size_;
-  if (p > kDoubtful || !(much || much_elsewhere)) return;
+  if (p > (found_.another_pair ? kDoubtfulOfAPair : kDoubtful) ||
+      !(much || much_elsewhere || found_.another_pair))
+    return;
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, much ? left.size : gate.size));

@@ -168,6 +168,7 @@ bool Search::another_pair_closes_more(const Step& step) {
                   ranking_.id_of(trials[best]), second, first));
   put_first(best);
   found_.added.back() = trials.front().hypothesis;
+  found_.another_pair = true;
   move_to(with({trials.front()}));
   return true;
 }

@@ -31,6 +31,7 @@ constexpr double kHardlyAnything =
 
 Found Search::run() {
   found_.floors = floors_of(data_);
+  found_.another_pair = look_.another_pair;
   first_weights();
   found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
   reweight(data_, found_.baseline, found_.weights);

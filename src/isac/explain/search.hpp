@@ -36,7 +36,9 @@ struct Found {
   std::vector<int> added;       ///< hypotheses, in order
   bool adequate = true;         ///< nothing significant and material is left
   bool comes_and_goes = false;  ///< something named was not of one size throughout (constancy.hpp)
-  Gate gate;                    ///< of the baseline
+  bool another_pair =
+      false;  ///< what closed most alone left too little for a second name: two others took its place
+  Gate gate;  ///< of the baseline
   /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
   std::vector<std::string> doubts;
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
@@ -58,6 +60,7 @@ struct Look {
   Gate gate;                  ///< of the baseline, by that look
   Weights weights;            ///< of that look, whose colour of the pressures stands
   bool colour_beside_best = false;  ///< its noise's colour was read off beside an effect
+  bool another_pair = false;        ///< Found::another_pair
   /// What it found, of a library of the same hypotheses: beside it the colour is read off where it had to be read off beside an effect.
   std::vector<std::pair<int, Values>> found;
   std::vector<TrialNote> notes;  ///< what was said up to them
