@@ -33,6 +33,7 @@ const std::string& form_of(const explain::Candidate& effect) {
 }
 
 const Estimated* delay_of(const explain::Explanation& answer) {
+  if (!answer.adds()) return nullptr;
   for (const explain::Candidate& effect : answer.effects)
     if (form_of(effect) == "dead_time" && !effect.parameters.empty()) return &effect.parameters.front();
   return nullptr;
@@ -96,6 +97,7 @@ record::Params params_of(const explain::Explanation& answer, const ExplainInputs
   params.sections.push_back(std::move(joint));
   if (record::ParamsSection valve = valve_of(answer, inputs); !valve.values.empty())
     params.sections.push_back(std::move(valve));
+  if (!answer.adds()) return params;
   for (const explain::Candidate& effect : answer.effects) {
     record::ParamsSection section = section_of("effects", form_of(effect), inputs);
     section.values = effect.parameters;
@@ -106,6 +108,7 @@ record::Params params_of(const explain::Explanation& answer, const ExplainInputs
 
 std::vector<std::string> compensation_of(const explain::Explanation& answer) {
   std::vector<std::string> sentences;
+  if (!answer.adds()) return sentences;
   for (const explain::Candidate& effect : answer.effects) {
     const int index = models::find_effect(form_of(effect));
     if (index < 0) continue;

@@ -114,6 +114,7 @@ std::string format_explanation(const explain::Explanation& e, const std::vector<
   extra["summary"] = report::verdict_sentence(e);
   extra["disagreement"] = disagreement_of(e);
   extra["effects"] = candidates_of(e.effects);
+  extra["withheld"] = words_or_null(e.withheld);
   extra["alternatives"] = candidates_of(e.alternatives);
   extra["rejected"] = candidates_of(e.rejected);
   extra["unknown"] = unknown_of(e);

@@ -120,7 +120,7 @@ void print_explanation(const explain::Explanation& e, const std::vector<std::str
   sheet.row("gap", report::gap_sentence(e));
   for (std::size_t i = 0; i < std::min<std::size_t>(3, e.where.size()); ++i)
     sheet.row(i == 0 ? "where" : "", report::region_sentence(e.where[i]));
-  print_candidates(sheet, "added", e.effects, 8);
+  print_candidates(sheet, e.adds() ? "added" : "named", e.effects, 8);
   print_candidates(sheet, "or", e.alternatives, 6);
   print_candidates(sheet, "not", e.rejected, 3);
   for (std::size_t i = 0; i < compensation.size(); ++i) sheet.row(i == 0 ? "control" : "", compensation[i]);

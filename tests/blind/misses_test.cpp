@@ -246,4 +246,26 @@ TEST(Moments, that_no_run_tells_are_told_by_none) {
     EXPECT_NE(said.find(part), std::string::npos) << said;
 }
 
+// A faint shift of a pressure sensor, six sigma on the fitted runs, with which the held-out ones are further off by chance.
+TEST(Withheld, is_what_the_held_out_runs_speak_against) {
+  const std::string bin = ISAC_BIN_DIR, day = scratch("withheld"), answer = day + ".txt",
+                    params = day + ".toml";
+  const std::string call = bin + "/blind_generate --out " + day + " --label " + day +
+                           ".json --seed 2471026980889693474 --noise coloured --effect pressure_offset "
+                           "--ratio 0.25 > /dev/null && " +
+                           bin + "/isac-explain " + day + " -o " + params + " > " + answer + " 2>&1";
+  ASSERT_EQ(std::system(call.c_str()), 0) << call;
+  const auto words_of = [](const std::string& path) {
+    std::string text, word;
+    for (std::ifstream in(path); in >> word;) text += word + ' ';
+    return text;
+  };
+  const std::string said = words_of(answer), written = words_of(params);
+  for (const std::string& path : {day, day + ".json", answer, params}) std::filesystem::remove_all(path);
+  for (const char* part : {"is not added: the held-out runs are", "named pressure_offset"})
+    EXPECT_NE(said.find(part), std::string::npos) << said.substr(0, 1500);
+  EXPECT_NE(written.find("[joint"), std::string::npos) << written;
+  EXPECT_EQ(written.find("effects"), std::string::npos) << written;
+}
+
 }  // namespace

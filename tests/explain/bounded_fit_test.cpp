@@ -51,9 +51,16 @@ TEST(BoundedFit, finds_a_linear_best_point_on_a_bound_in_one_step) {
     return true;
   };
   const Eigen::Vector3d lower(-0.5, -0.5, -0.5), upper(0.5, 5, 5);
-  const BoundedFit fit = bounded_fit(linear, Eigen::Vector3d(0, 0, 0), lower, upper);
+  int slopes = 0;
+  const Evaluate counted = [&](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
+    slopes += jacobian != nullptr;
+    return linear(x, r, jacobian);
+  };
+  const BoundedFit fit = bounded_fit(counted, Eigen::Vector3d(0, 0, 0), lower, upper);
   EXPECT_TRUE(fit.converged);
-  EXPECT_LE(fit.rounds, 3);
+  EXPECT_EQ(fit.rounds, 1);
+  EXPECT_EQ(slopes, 1);  // the step closed what it promised: no others are asked for
+  EXPECT_TRUE(fit.curvature.isApprox(J.transpose() * J));
   EXPECT_EQ(fit.x[0], 0.5);
   // Against a second method: slope towards the inside nowhere.
   const Eigen::VectorXd slope = J.transpose() * fit.residual;

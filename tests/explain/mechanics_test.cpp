@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "experiment_bench.hpp"
 #include "isac/explain/generic_fit.hpp"
@@ -132,6 +133,76 @@ TEST(Threshold, that_only_one_run_falls_below_comes_back) {
   lower.seconds = 4;
   const Bench bench(rig, {by_hand(30, 0.35, 1.0), low, lower});
   EXPECT_NEAR(fitted(bench, "threshold_pressure").values[0], rig.threshold, 0.02 * rig.threshold);
+}
+
+/// What an effect adds to the rows of the torque beside a model, by its own sum and by the difference of two predictions.
+void expect_it_adds_up(const Bench& bench, const ModelPoint& model, const Active& effect) {
+  ASSERT_TRUE(bench.predictor.adds_up(model, *effect.hypothesis));
+  const auto rows = static_cast<Eigen::Index>(bench.predictor.rows());
+  Eigen::VectorXd added = Eigen::VectorXd::Zero(rows), without = added, with = added;
+  bench.predictor.predict_addition(model, effect, added);
+  bench.predictor.predict(model, bit(Chain::kTorque), without);
+  ModelPoint both = model;
+  both.effects.push_back(effect);
+  bench.predictor.predict(both, bit(Chain::kTorque), with);
+  const double largest = added.cwiseAbs().maxCoeff();
+  EXPECT_GT(largest, 1e-3);
+  EXPECT_LT((with - without - added).cwiseAbs().maxCoeff(), 1e-6 * largest);
+}
+
+TEST(ForceReadings, that_are_shifted_leave_a_torque_what_it_is_and_others_do_not) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), by_hand(20, 0.3, 3.0)});
+  for (const char* shifted : {"force_offset", "force_drift"}) {
+    ModelPoint model = bench.stem.model;
+    model.effects.push_back({bench.find(shifted), {0.4, -0.3}});
+    expect_it_adds_up(bench, model, {bench.find("coulomb_friction"), {0.02}});
+    expect_it_adds_up(bench, model, {bench.find("torque_ripple"), {0.01, 0.02, 16}});
+  }
+  ModelPoint model = bench.stem.model;
+  model.effects.push_back({bench.find("force_gain_error"), {0.05, -0.02}});
+  EXPECT_FALSE(bench.predictor.adds_up(model, *bench.find("coulomb_friction")));
+}
+
+// Where no sensor has a memory, its reading at a row is that of the torque there.
+TEST(ForceReadings, by_row_are_those_of_the_whole_recording) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), by_hand(20, 0.3, 3.0)});
+  ModelPoint model = bench.stem.model;
+  model.effects.push_back({bench.find("force_gain_error"), {0.05, -0.02}});
+  model.effects.push_back({bench.find("cubic_stiffness"), {0.05}});
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bench.predictor.rows()));
+  bench.predictor.predict(model, bit(Chain::kTorque), rows);
+  double off = 0, largest = 0;
+  for (std::size_t r = 0; r < bench.data.runs.size(); ++r) {
+    const std::vector<double> whole = bench.predictor.full_rate(model, r).torque;
+    for (std::size_t i = bench.data.run_begin[r]; i < bench.data.run_begin[r + 1]; ++i) {
+      if (bench.data.rows[i].chain != Chain::kTorque) continue;
+      off = std::max(off, std::abs(rows[static_cast<Eigen::Index>(i)] - whole[bench.data.rows[i].sample]));
+      largest = std::max(largest, std::abs(whole[bench.data.rows[i].sample]));
+    }
+  }
+  EXPECT_LT(off, 2e-3 * largest);  // a smooth torque, which the kernel hardly changes
+}
+
+// A loop that is compiled for one effect, and the loop for several that looks them up.
+TEST(Valves, move_alike_by_either_loop) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 0.8, 6)});
+  const std::pair<const char*, Values> effects[] = {{"supply_droop", {2.5e5, 0.3, 1.0}},
+                                                    {"second_order_lag", {0.01}},
+                                                    {"valve_deadband", {2e3}},
+                                                    {"valve_hysteresis", {3e3}},
+                                                    {"flow_limit", {1e4}}};
+  for (const auto& [id, values] : effects) {
+    ModelPoint model = bench.stem.model;
+    model.effects.push_back({bench.find(id), values});
+    Eigen::VectorXd one = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(bench.predictor.rows())),
+                    both = one, none = one;
+    bench.predictor.predict(bench.stem.model, kPressureChains, none);
+    bench.predictor.predict(model, kPressureChains, one);
+    model.effects.push_back({bench.find("volume_coupling"), {1e-6}});  // Pa/rad: next to nothing
+    bench.predictor.predict(model, kPressureChains, both);
+    EXPECT_GT((one - none).cwiseAbs().maxCoeff(), 100) << id;  // Pa
+    EXPECT_LT((one - both).cwiseAbs().maxCoeff(), 1e-3) << id;
+  }
 }
 
 // Angles pass the kernel after a slip was taken off and before a gain is; beside a gain both ways must end alike.

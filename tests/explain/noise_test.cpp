@@ -90,6 +90,26 @@ TEST(Colour, is_the_same_where_a_chain_begins_with_a_gap) {
   EXPECT_NEAR(after.white, before.white, 0.05 * before.white);
 }
 
+TEST(Colour, passes_columns_side_by_side_as_it_passes_each) {
+  const Prepared data = rows_of_runs(3, 400);
+  Weights weights;
+  weights.sigma[0] = 0.5;
+  weights.colour[0] = {.white = 4.0, .slow = 16.0, .memory = 0.2, .wander = 12.0};
+  weights.take(data);
+  Eigen::MatrixXd columns(static_cast<Eigen::Index>(data.rows.size()), 7);  // a group of four, and three
+  for (Eigen::Index c = 0; c < columns.cols(); ++c)
+    columns.col(c) = noise(data, 1.0, 4.0, 0.2, 3.0, 50 + static_cast<unsigned>(c));
+  Eigen::MatrixXd together = columns;
+  weigh(data, weights, together);
+  const Eigen::MatrixXd back = unfiltered_each(data, weights, together);
+  for (Eigen::Index c = 0; c < columns.cols(); ++c) {
+    Eigen::VectorXd alone = columns.col(c);
+    weigh(data, weights, alone);
+    EXPECT_EQ(alone, together.col(c)) << c;
+    EXPECT_EQ(unfiltered(data, weights, alone), back.col(c)) << c;
+  }
+}
+
 TEST(Colour, is_gone_from_what_the_filter_leaves_and_comes_back_without_it) {
   const Prepared data = rows_of_runs(6, 4000);
   const Eigen::VectorXd before = noise(data, 1.0, 4.0, 0.2, 3.0, 1);

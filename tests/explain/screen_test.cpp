@@ -310,6 +310,18 @@ TEST(JointP, of_two_tests_is_small_no_more_often_than_it_says) {
   EXPECT_NEAR(joint_p(0.5, 1, kLevel), 0.5, 0.02);
 }
 
+TEST(Flips, are_the_same_whoever_reckons_them) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd scores(130, 40);
+  for (Eigen::Index i = 0; i < scores.size(); ++i) scores.data()[i] = normal(random);
+  const FlipTest one = flip_test(scores, 999, 3, 0.01),
+                 two = flip_test(scores, 999, 3, 0.01, std::nullopt, 2);
+  EXPECT_EQ(one.p_value, two.p_value);
+  EXPECT_EQ(one.limit, two.limit);
+  EXPECT_EQ(one.statistic, two.statistic);
+}
+
 TEST(KeptResponses, serve_a_screen_beside_another_torque_as_well) {
   const test::TiedRig rig{.dry = 0.02};
   const Prepared data =

@@ -48,6 +48,21 @@ TEST(Workers, do_work_within_work_and_beside_it) {
   EXPECT_EQ(done, 128);
 }
 
+TEST(Workers, share_what_the_only_task_shares) {
+  std::set<std::thread::id> ids;
+  share_work(2, 1, [&](std::size_t) {
+    std::atomic<int> waiting{0};
+    std::vector<std::thread::id> who(2);
+    share_work(2, 2, [&](std::size_t i) {
+      who[i] = std::this_thread::get_id();
+      ++waiting;
+      while (waiting < 2) std::this_thread::yield();
+    });
+    ids.insert(who.begin(), who.end());
+  });
+  EXPECT_EQ(ids.size(), 2U);
+}
+
 TEST(Workers, pass_on_what_work_throws_and_work_again) {
   for (const int threads : {1, 2}) {
     EXPECT_THROW(share_work(threads, 50,

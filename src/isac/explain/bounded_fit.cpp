@@ -85,6 +85,7 @@ BoundedFit bounded_fit(const Evaluate& evaluate, Eigen::VectorXd start, const Ei
     Eigen::MatrixXd H = Eigen::MatrixXd::Zero(fit.x.size(), fit.x.size());
     H.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
     H = Eigen::MatrixXd(H.selfadjointView<Eigen::Lower>());
+    fit.curvature = H;
     const Eigen::VectorXd g = jacobian.transpose() * fit.residual;
     const double largest = std::max(H.diagonal().maxCoeff(), 1e-300);
     // What the data do not feel stays where it is: a stop that nothing reached would be moved by the noise of its slope, into what was reached.

@@ -21,7 +21,8 @@ using Evaluate =
 
 struct BoundedFit {
   Eigen::VectorXd x, residual;
-  double loss = 0;  ///< |r|²
+  Eigen::MatrixXd curvature;  ///< JᵀJ where the last step began; empty where there was none
+  double loss = 0;            ///< |r|²
   int rounds = 0;
   bool converged = false;
 };

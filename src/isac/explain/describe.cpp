@@ -50,9 +50,9 @@ Chain chain_of(const Prepared& data, const std::string& signal) {
   return Chain::kTorque;
 }
 
-/// The model of which the explanation tells: nothing was added where nothing was named.
+/// The model of which the explanation tells: nothing was added where nothing was named, or the held-out runs speak against it.
 const Fit& told_model(const Found& found, const Explanation& e) {
-  return e.effects.empty() ? found.baseline : found.model;
+  return e.adds() ? found.model : found.baseline;
 }
 
 /// p-value of what shows in one chain; where something was found in it, of the whole search.
@@ -75,9 +75,9 @@ void add_signals(const Predictor& predictor, const Found& found, Explanation& e)
       s.after = e.gap.after;
     } else {
       s.rmse = label.scale * raw_residual(predictor, found.baseline.model, chain).rms();
-      s.after = e.effects.empty() || found.added.empty()
-                    ? s.rmse
-                    : label.scale * raw_residual(predictor, found.model.model, chain).rms();
+      s.after = e.adds() && !found.added.empty()
+                    ? label.scale * raw_residual(predictor, found.model.model, chain).rms()
+                    : s.rmse;
     }
     const auto c = static_cast<std::size_t>(chain);
     s.noise_floor = label.scale * found.floors.all(static_cast<Chain>(c));
@@ -93,9 +93,10 @@ void add_numbers(const Predictor& predictor, const Found& found, const std::opti
   const Uncertain after =
       numbers && &fit == &found.model ? *numbers : uncertainties(predictor, fit, found.weights);
   e.base = after.base;
-  for (std::size_t i = 0; i < after.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
-    if (after.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = after.effects[i];
-  if (e.effects.empty() || found.added.empty()) return;
+  const Uncertain& named = numbers ? *numbers : after;
+  for (std::size_t i = 0; i < named.effects.size() && i < e.effects.size() && i < found.added.size(); ++i)
+    if (named.effects[i].size() == e.effects[i].parameters.size()) e.effects[i].parameters = named.effects[i];
+  if (!e.adds() || found.added.empty()) return;
   // Of several effects the first that enters the rows which the parameter enters.
   const auto stood_in_for = [&](const BaseParameter& base) -> std::string {
     for (std::size_t i = 0; i < e.effects.size() && i < found.added.size(); ++i) {
@@ -123,7 +124,7 @@ void add_waterfall(const Predictor& predictor, const Library& library, const Fou
                    Chain chain, Explanation& e) {
   const double scale = label_of(predictor.data(), chain).scale;
   e.waterfall.insert(e.waterfall.begin(), {"baseline", e.gap.before, e.gap.heldout_before});
-  if (e.effects.empty()) return;
+  if (!e.adds()) return;
   std::vector<WaterfallStep> steps;
   Fit fit = found.baseline;
   for (std::size_t k = 0; k < found.added.size(); ++k) {
@@ -154,6 +155,7 @@ std::string missed(const Explanation& e) {
 
 std::string closing(const Explanation& e) {
   const Gap& gap = e.gap;
+  if (!e.withheld.empty()) return "on the fitted runs, and nothing is added: " + e.withheld;
   if (std::isfinite(gap.freed_before))
     return fmt::format("{} → {} on held-out runs, freed of the noise's slow part", rounded(gap.freed_before),
                        with_unit(gap.freed_after, gap.unit));
@@ -254,6 +256,13 @@ std::string summary_of(const Explanation& e) {
     case Verdict::kNamed: {
       if (e.effects.empty()) return missed(e);
       std::string text = missed(e);
+      if (!e.withheld.empty()) {
+        const bool one = e.effects.size() == 1;
+        return text + fmt::format(" {}{} {} what the fitted runs show, and {} not added: {}.",
+                                  upper_first(joined(terms_of(e.effects, 4))),
+                                  one ? ", " + numbers_of(e.effects.front()) + "," : "", one ? "is" : "are",
+                                  one ? "is" : "are", e.withheld);
+      }
       if (e.effects.size() == 1) {
         text += fmt::format(" {}, {}, closes it: {}.", upper_first(e.effects.front().name),
                             numbers_of(e.effects.front()), closing(e));

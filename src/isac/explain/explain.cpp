@@ -163,6 +163,21 @@ bool same_hypotheses(const Library& a, const Library& b) {
                     });
 }
 
+/// What is named is not added where the model would be further off for it on runs that it has not seen.
+void withhold(Explanation& e) {
+  constexpr double kWorse = 1.001;  // less is nothing
+  Gap& gap = e.gap;
+  const bool freed_speaks_for_it = std::isfinite(gap.freed_before) && gap.freed_after < gap.freed_before;
+  if (e.verdict == Verdict::kUnknown || e.effects.empty() ||
+      !(gap.heldout_after > kWorse * gap.heldout_before) || freed_speaks_for_it)
+    return;
+  e.withheld = fmt::format("the held-out runs are {:.4g} {} off without it and {:.4g} with it",
+                           gap.heldout_before, gap.unit, gap.heldout_after);
+  gap.after = gap.before;
+  gap.heldout_after = gap.heldout_before;
+  gap.share_closed = gap.freed_before = gap.freed_after = kNotKnown;
+}
+
 /// None of the catalogue: what came nearest is told as ruled out, nothing is added.
 void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& e) {
   for (Candidate& c : e.effects) e.rejected.insert(e.rejected.begin(), c);
@@ -289,6 +304,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.trials.push_back({e.effects.front().id, why});
     if (options.progress) options.progress(e.effects.front().id + ": " + why);
   }
+  withhold(e);
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);

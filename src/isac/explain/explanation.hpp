@@ -150,7 +150,11 @@ struct Explanation {
   double p_value = 1;  ///< over the whole search
   std::vector<SignalGap> signals;
   std::vector<Region> where;
-  std::vector<Candidate> effects;       ///< what was added, in the order added
+  std::vector<Candidate>
+      effects;  ///< what was named, and added where `withheld` is empty, in the order added
+  /// What the held-out runs say against adding what was named, as a clause: they are further off with it, and neither is that the doing of the
+  /// noise's slow part nor is it enough to refute the name. Then all numbers are those of the baseline but the effects' own.
+  std::string withheld;
   std::vector<Candidate> alternatives;  ///< what the data cannot rule out, best first
   std::vector<std::string>
       doubts;  ///< sentences: why what was added may be none of the catalogue; then the last alternative is "unknown"
@@ -168,6 +172,9 @@ struct Explanation {
   Warnings warnings;
   std::size_t samples = 0, blocks = 0, fitted_runs = 0, heldout_runs = 0;
   double seconds = 0, block_seconds = 0;  ///< of recording; of a block
+
+  /// Is the model another than the baseline?
+  [[nodiscard]] bool adds() const noexcept { return !effects.empty() && withheld.empty(); }
 };
 
 }  // namespace isac::explain

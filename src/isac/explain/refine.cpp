@@ -5,6 +5,7 @@
 #include <functional>
 #include <string_view>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/bounded_fit.hpp"
 #include "isac/explain/screen.hpp"
 
@@ -160,8 +161,10 @@ void try_other_stop(Projected& problem, const Hypothesis& hypothesis, const Eige
 void leave_out_what_nothing_tells(Projected& problem, const Hypothesis& hypothesis,
                                   const Eigen::VectorXd& lower, const Eigen::VectorXd& upper,
                                   const std::vector<std::size_t>& free, const std::vector<double>& scale,
-                                  int iterations, Eigen::VectorXd& x, Refined& refined) {
+                                  int iterations, const Eigen::MatrixXd& curvature, Eigen::VectorXd& x,
+                                  Refined& refined) {
   constexpr double kAsWell = 9;  // weighted squares, three sigma: what tells less of the second tells nothing
+  constexpr double kFarMore = 100;
   constexpr double kAlike = 0.1;  // of the larger: what they may have in common
   const auto alike = [&](Eigen::Index j) {
     if (x.size() != 2 || hypothesis.info().parameter_count != 2) return false;
@@ -175,6 +178,10 @@ void leave_out_what_nothing_tells(Projected& problem, const Hypothesis& hypothes
     const bool at_end = x[j] <= lower[j] + margin || x[j] >= upper[j] - margin;
     if (!hypothesis.amplitude[k] || null != 0 || lower[j] > 0 || upper[j] < 0 || x[j] == 0) continue;
     if (!at_end && !alike(j)) continue;
+    if (!at_end && curvature.rows() == x.size()) {  // what its absence costs, were the residual straight
+      const Eigen::VectorXd column = estimate::solve_symmetric(curvature, Eigen::VectorXd::Unit(x.size(), j));
+      if (column[j] > 0 && x[j] * x[j] / column[j] > kFarMore * kAsWell) continue;
+    }
     Eigen::VectorXd low = lower, high = upper, without = x;
     low[j] = high[j] = without[j] = 0;
     if (alike(j))  // the other as it is without what they have in common
@@ -243,7 +250,8 @@ Refined refine(const Around& place, const Hypothesis& hypothesis, const Values& 
       }
     }
   }
-  leave_out_what_nothing_tells(problem, hypothesis, lower, upper, free, scale, iterations, x, refined);
+  leave_out_what_nothing_tells(problem, hypothesis, lower, upper, free, scale, iterations, fit.curvature, x,
+                               refined);
   if (id == "end_stop") try_other_stop(problem, hypothesis, lower, upper, scale, iterations, x, refined);
   refined.values = start;
   for (Eigen::Index j = 0; j < m; ++j)

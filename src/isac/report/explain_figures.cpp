@@ -149,7 +149,7 @@ std::vector<Figure> run_figures(const Explanation& e, std::size_t most) {
   const bool any_heldout = !traces.empty() && traces.front()->heldout;
   for (std::size_t i = 0; i < traces.size() && figures.size() < most; ++i) {
     if (any_heldout && !traces[i]->heldout) break;
-    figures.push_back(run_figure(*traces[i], i, !e.effects.empty()));
+    figures.push_back(run_figure(*traces[i], i, e.adds()));
   }
   return figures;
 }

@@ -148,7 +148,7 @@ void add_map(Figure& figure, const Variable& x, const Variable& y, const Samples
 
 Figure profile_figure(const Explanation& e, const std::string& signal, const std::string& position_unit) {
   const Samples all = gather(e, signal);
-  const bool added = !e.effects.empty();
+  const bool added = e.adds();
   Figure figure{
       .id = "profile-" + signal,
       .alt = "Mean residual of " + signal + " over speed, angle and pressures",
@@ -187,7 +187,7 @@ Figure profile_figure(const Explanation& e, const std::string& signal, const std
 
 Figure map_figure(const Explanation& e, const std::string& signal, const std::string& position_unit) {
   const Samples all = gather(e, signal);
-  const bool added = !e.effects.empty();
+  const bool added = e.adds();
   const std::string unit = pretty_unit(all.unit);
   Figure figure{.id = "map-" + signal,
                 .alt = "Mean residual of " + signal + " over two variables, as colours",

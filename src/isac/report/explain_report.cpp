@@ -78,7 +78,7 @@ void add_answer(Document& page, const Explanation& e) {
   page.box(box_of(e.verdict), "The answer", lines);
 
   const explain::Gap& gap = e.gap;
-  const bool heldout = std::isfinite(gap.heldout_before), added = !e.effects.empty();
+  const bool heldout = std::isfinite(gap.heldout_before), added = e.adds();
   // What moments, a curve or the held-out runs tell, the search's own test does not see.
   constexpr double kLevel = 0.01;
   const bool beside_the_search = e.verdict == Verdict::kUnknown && e.p_value > kLevel;
@@ -241,7 +241,9 @@ void add_proof(Document& page, const Explanation& e) {
 void add_numbers(Document& page, const Explanation& e) {
   if (e.base.empty() && e.base_changes.empty()) return;
   page.heading("Parameters");
-  add_parameters(page, e.base, "The baseline's parameters, refitted beside the effects.");
+  add_parameters(
+      page, e.base,
+      e.adds() ? "The baseline's parameters, refitted beside the effects." : "The baseline's parameters.");
   std::vector<Estimated> added;
   for (const Candidate& effect : e.effects) {
     for (Estimated parameter : effect.parameters) {
@@ -249,8 +251,8 @@ void add_numbers(Document& page, const Explanation& e) {
       added.push_back(std::move(parameter));
     }
   }
-  add_parameters(page, added, "Parameters of what was added.");
-  if (e.effects.empty()) return;
+  add_parameters(page, added, e.adds() ? "Parameters of what was added." : "Parameters of what was named.");
+  if (!e.adds()) return;
   Table table{.caption = "What the baseline had stood in for.",
               .columns = {{"Parameter"}, {"Before", true}, {"After", true}, {"Unit"}, {"Change"}}};
   for (const explain::BaseChange& change : e.base_changes) {
@@ -262,7 +264,7 @@ void add_numbers(Document& page, const Explanation& e) {
 }
 
 void add_use(Document& page, const ExplainReportInput& input) {
-  if (input.answer->effects.empty()) return;
+  if (!input.answer->adds()) return;
   page.heading("In the controller and the simulator");
   if (!input.compensation.empty()) page.bullets(input.compensation);
   if (input.params_file.empty()) {

@@ -95,8 +95,7 @@ std::string gap_sentence(const Explanation& e) {
           : std::string("On the fitted runs (") +
                 (e.heldout_runs > 0 ? "the held-out ones do not show it" : "none was held out") + ") the ";
   text += signal_in_words(gap.signal) + " is " + with_unit(before, gap.unit) + " rms off";
-  if (std::isfinite(after) && !e.effects.empty())
-    text += " before and " + with_unit(after, gap.unit) + " after";
+  if (std::isfinite(after) && e.adds()) text += " before and " + with_unit(after, gap.unit) + " after";
   constexpr double kRemembers = 1.25;  // of the floor: nothing is missing, and yet so much more is left
   const bool nothing = e.verdict == Verdict::kNone || e.verdict == Verdict::kImmaterial;
   if (nothing && before > kRemembers * gap.noise_floor)
@@ -108,7 +107,7 @@ std::string gap_sentence(const Explanation& e) {
     text += "; the noise's slow part decides which is larger: freed of it, " +
             with_unit(gap.freed_before, gap.unit) + " before and " + with_unit(gap.freed_after, gap.unit) +
             " after";
-  if (std::isfinite(gap.share_closed) && !e.effects.empty())
+  if (std::isfinite(gap.share_closed) && e.adds())
     text += ", so " + share_closed_in_words(gap.share_closed) + " of what can be explained is closed";
   return text + ".";
 }
