@@ -1,7 +1,7 @@
 /// @file
 /// Work on several threads that stay: what a thread keeps for itself (inputs of runs, predict_inputs.cpp) is there at the next call.
 ///
-/// Threads: the workers serve one call at a time; a call from within another's work, or beside it, does its work itself. Deterministic where
+/// Threads: the workers serve one call at a time; a call from within another's work (but for work that is a single piece), or beside it, does its work itself. Deterministic where
 /// work(i) touches what is i's only. Errors: the first exception that work throws, once all others have returned. Source: none.
 #pragma once
 
