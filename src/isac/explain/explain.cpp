@@ -171,7 +171,7 @@ void withhold(Explanation& e) {
   if (e.verdict == Verdict::kUnknown || e.effects.empty() ||
       !(gap.heldout_after > kWorse * gap.heldout_before) || freed_speaks_for_it)
     return;
-  e.withheld = fmt::format("the held-out runs are {:.4g} {} off without it and {:.4g} with it",
+  e.withheld = fmt::format("the held-out runs are {:#.4g} {} off without it and {:#.4g} with it",
                            gap.heldout_before, gap.unit, gap.heldout_after);
   gap.after = gap.before;
   gap.heldout_after = gap.heldout_before;

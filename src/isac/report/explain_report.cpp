@@ -82,9 +82,10 @@ void add_answer(Document& page, const Explanation& e) {
   // What moments, a curve or the held-out runs tell, the search's own test does not see.
   constexpr double kLevel = 0.01;
   const bool beside_the_search = e.verdict == Verdict::kUnknown && e.p_value > kLevel;
-  std::vector<Card> cards = {{"Verdict", verdict_word(e.verdict),
-                              beside_the_search ? "not seen by the search's own test, " + chance(e.p_value)
-                                                : chance(e.p_value) + " for “only noise”"}};
+  std::vector<Card> cards = {
+      {"Verdict", std::string(verdict_word(e.verdict)) + (e.withheld.empty() ? "" : ", not added"),
+       beside_the_search ? "not seen by the search's own test, " + chance(e.p_value)
+                         : chance(e.p_value) + " for “only noise”"}};
   const bool freed = std::isfinite(gap.freed_before);
   const char* where = freed     ? "rms, held-out runs, freed of the noise's slow part"
                       : heldout ? "rms, held-out runs"
