@@ -171,6 +171,42 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   return test;
 }
 
+Eigen::VectorXd error_of_means(const Around& place) {
+  const Prepared& data = place.predictor->data();
+  Eigen::VectorXd torque = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+  const double gain = place.predictor->pressure_gain(place.fit->model);
+  for (std::size_t i = 0; i < data.rows.size(); ++i)
+    if (data.rows[i].chain == Chain::kTorque)
+      torque[static_cast<Eigen::Index>(i)] = gain * data.runs[data.rows[i].run].mean_pressure_error;
+  if (torque.squaredNorm() > 0) weigh(data, *place.weights, torque);
+  return torque;
+}
+
+Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept, int hypothesis,
+                           const Eigen::VectorXd& residual) {
+  const Prepared& data = place.predictor->data();
+  Yardstick yardstick{.hypothesis = hypothesis,
+                      .functions = {},
+                      .own_p = p_of_refit(data, place.residual, residual, error_of_means(place))};
+  std::size_t function = 0;
+  for (const Column& known : screen.columns) {
+    if (known.hypothesis >= 0) continue;
+    const Eigen::VectorXf& x = kept.function(function++);
+    Column c;
+    c.chain = known.chain;
+    c.norm2 = known.norm2;
+    c.atom_score = c.atom_norm = Eigen::VectorXd::Zero(known.atom_score.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const auto b = static_cast<Eigen::Index>(data.rows[static_cast<std::size_t>(i)].atom);
+      const double value = x[i];
+      c.atom_score[b] -= value * residual[i];
+      c.atom_norm[b] += value * value;
+    }
+    yardstick.functions.push_back(std::move(c));
+  }
+  return yardstick;
+}
+
 double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
                   const Eigen::VectorXd& error_of_means) {
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
