@@ -173,6 +173,7 @@ void withhold(Explanation& e) {
     return;
   e.withheld = fmt::format("the held-out runs are {:#.4g} {} off without it and {:#.4g} with it",
                            gap.heldout_before, gap.unit, gap.heldout_after);
+  e.waterfall.clear();
   gap.after = gap.before;
   gap.heldout_after = gap.heldout_before;
   gap.share_closed = gap.freed_before = gap.freed_after = kNotKnown;
@@ -304,7 +305,6 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.trials.push_back({e.effects.front().id, why});
     if (options.progress) options.progress(e.effects.front().id + ": " + why);
   }
-  withhold(e);
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);
@@ -324,6 +324,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   e.where = regions(predictor, library, found);
   constexpr std::size_t kMostHidden = 64;  // every effect that was looked for and not found has a bound
   add_raw_effects(predictor, found, proof, options, e);
+  withhold(e);  // of all that was named: a line or spikes may have mended the gap
   e.could_hide = could_hide(data, library, found, kMostHidden);
   e.not_testable = not_testable(data, library, found);
   std::erase_if(e.not_testable, [&](const std::string& id) {  // what was refitted was tested
