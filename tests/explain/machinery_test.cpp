@@ -7,7 +7,6 @@
 #include <type_traits>
 
 #include "isac/explain/explain.hpp"
-#include "isac/explain/generic_fit.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/screen.hpp"
 #include "isac/explain/search.hpp"
@@ -404,34 +403,6 @@ TEST(Explain, hears_a_valve_that_hunts_though_functions_of_the_signals_are_like_
   ASSERT_TRUE(e.unknown.has_value());
   EXPECT_EQ(e.unknown->subsystem, "pcu") << e.summary;
   EXPECT_EQ(e.unknown->depends_on, std::vector<std::string>{"time"}) << e.summary;
-}
-
-TEST(GenericFit, stands_beside_a_name_that_is_right_and_before_one_that_is_not) {
-  const test::TiedRig rig{.dry = 0.03};
-  Prepared data = prepare(test::record_all(rig, small_day()), rig.facts(), {}, 4.0);
-  const Library library = make_library(data);
-  const Predictor predictor(data);
-  Weights weights;
-  for (double& sigma : weights.sigma) sigma = 150;  // Pa
-  weights.sigma[0] = weights.sigma[3] = 0.003;
-  const Fit fit = fit_baseline(predictor, library.tolerances, weights);
-  const Around place = around(predictor, fit, weights);
-  const Screen seen = screen(place, library, {.flips = 199, .dictionary = true});
-  const GenericFit generic = fit_generic(place, seen);
-  ASSERT_FALSE(generic.functions.empty());
-  EXPECT_EQ(generic.chain, Chain::kTorque);
-  EXPECT_NEAR(generic.residual.squaredNorm(), place.residual.squaredNorm() - generic.gain,
-              1e-6 * place.residual.squaredNorm());
-  const auto behind = [&](const char* id) {
-    for (const Screened& c : seen.candidates) {
-      const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(c.hypothesis)];
-      if (h.id() != id) continue;
-      return behind_generic(data, refine(place, h, c.start).residual, h.parameters(), generic).t;
-    }
-    return std::nan("");
-  };
-  EXPECT_LT(behind("coulomb_friction"), 1.0);
-  EXPECT_GT(behind("quadratic_damping"), 3.0);
 }
 
 TEST(Explain, answers_the_same_whatever_the_order_of_the_runs) {

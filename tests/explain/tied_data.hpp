@@ -30,6 +30,7 @@ struct TiedRig {
   double encoder_play = 0;                // rad, half of it, between joint and encoder
   double encoder_drift = 0;               // rad/s from eight o'clock on
   double encoder_slip = 0, slip_at = 0;   // rad, s after eight o'clock
+  double force_drift = 0;                 // N/s of muscle 2's sensor from eight o'clock on
   double leak[2] = {0, 0}, deadband = 0;  // 1/s of each muscle; Pa of a valve that does not answer less
   double angle_damping = 0;           // N m s/rad3: a damping that grows with φ², which no catalogue has
   double bent_by = 0, bent_from = 0;  // share of its gain that muscle 2 loses above a pressure, Pa
@@ -165,7 +166,8 @@ inline series::Recording record(const TiedRig& rig, const explain::PlannedRun& r
       if (rig.zero_wander > 0)
         zero += -zero * 2e-5 + rig.zero_wander * std::sqrt(4e-5) * gauss(random);  // 500 Hz, 100 s
       const auto read = [&](int i) {
-        const double zeros = (i == 0 ? -0.5 : 0.5) * zero / rig.radius;
+        const double zeros =
+            (i == 0 ? -0.5 : 0.5) * zero / rig.radius + (i == 1 ? rig.force_drift * (since_eight + t) : 0);
         const double pull = rig.pushes ? force[i] : std::max(0.0, force[i]);
         return std::min(rig.force_most, pull + zeros + rig.force_noise * gauss(random));
       };

@@ -207,6 +207,18 @@ void tell_in_units_of(const BaselineModel& baseline, Explanation& e) {
   if (e.unknown) mend(e.unknown->variable_unit);
 }
 
+/// Of an effect that no name explains: which came nearest, and what ruled it out.
+std::string nearest_name(const Explanation& e) {
+  constexpr std::string_view kRuledOut = "ruled out: ";
+  if (!e.effects.empty() || e.rejected.empty()) return "";
+  const Candidate& nearest = e.rejected.front();
+  for (auto note = e.trials.rbegin(); note != e.trials.rend(); ++note)
+    if (note->id == nearest.id && note->sentence.starts_with(kRuledOut))
+      return fmt::format(" {} came nearest and is ruled out: {}.", upper_first(nearest.name),
+                         note->sentence.substr(kRuledOut.size()));
+  return "";
+}
+
 }  // namespace
 
 std::string change_sentence(const BaseChange& change, const std::string& effect) {
@@ -251,7 +263,7 @@ std::string summary_of(const Explanation& e) {
       if (e.unknown && !e.unknown->depends_on.empty())
         text += "; it depends on " +
                 joined(variables_in_words(e.unknown->depends_on, of_linear_axis(e.gap.unit)));
-      return text + ".";
+      return text + "." + nearest_name(e);
     }
     case Verdict::kNamed: {
       if (e.effects.empty()) return missed(e);

@@ -210,6 +210,11 @@ Chain Dictionary::chain(std::size_t column) const {
   return chains_[column / functions().size()];
 }
 
+std::size_t Dictionary::in(std::size_t column, Chain chain) const {
+  const auto at = std::find(chains_.begin(), chains_.end(), chain) - chains_.begin();
+  return static_cast<std::size_t>(at) * functions().size() + column % functions().size();
+}
+
 std::string Dictionary::name(std::size_t column) const {
   static constexpr const char* kNames[] = {"torque", "p1", "p2", "motion"};
   return std::string(kNames[static_cast<int>(chain(column))]) + ": " +

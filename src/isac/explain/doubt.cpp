@@ -250,8 +250,7 @@ void look_at_moments(const Predictor& predictor, const Found& found, Explanation
       "usual one: something is missing that shows only there, and neither an effect of the catalogue nor a "
       "function of the signals fits it. "
       "Look at those moments.{}",
-      label.signal == "motion" ? "balance of the free joint's motion" : label.signal, moments.time,
-      data.runs[moments.run].name, moments.times_usual,
+      in_words(label), moments.time, data.runs[moments.run].name, moments.times_usual,
       tell_signal(signal_that_tells(around(predictor, found.model, found.weights), moments.chain),
                   data.baseline, e));
 }
@@ -267,9 +266,8 @@ void look_at_curves(const Prepared& data, const Found& found, const ExplainOptio
   e.summary = fmt::format(
       "The {} depends on {} by a curve that neither an effect of the catalogue nor a function of the signals "
       "is like: {:.2f} of the noise floor, {:.0f} standard deviations beyond what noise does.",
-      label.signal == "motion" ? "balance of the free joint's motion" : label.signal,
-      variable_in_words(curve.variable, of_linear_axis(axis_unit("rad", data.baseline))), curve.size,
-      curve.z);
+      in_words(label), variable_in_words(curve.variable, of_linear_axis(axis_unit("rad", data.baseline))),
+      curve.size, curve.z);
 }
 
 }  // namespace isac::explain

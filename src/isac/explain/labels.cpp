@@ -24,6 +24,10 @@ Label label_of(const Prepared& data, Chain chain) {
   return {data.baseline.output, data.baseline.output_unit, 1};
 }
 
+std::string in_words(const Label& label) {
+  return label.signal == "motion" ? "balance of the free joint's motion" : label.signal;
+}
+
 std::string axis_unit(const std::string& unit, const BaselineModel& baseline) {
   if (baseline.position_unit == "rad") return unit;
   constexpr std::string_view kTorque = "N m", kAngle = "rad";

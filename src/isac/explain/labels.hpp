@@ -16,6 +16,8 @@ struct Label {
   double scale = 1;  ///< from SI to `unit`
 };
 [[nodiscard]] Label label_of(const Prepared& data, Chain chain);
+/// What a sentence calls it: a chain's signal, or "balance of the free joint's motion".
+[[nodiscard]] std::string in_words(const Label& label);
 /// A unit of the catalogue on this axis: on a linear one rad is m, a torque is a force and "kg m2" a mass; what grows with
 /// a power of speed or angle has that power of m beneath ("N m s3" is "N s3/m3").
 [[nodiscard]] std::string axis_unit(const std::string& unit, const BaselineModel& baseline);

@@ -72,10 +72,13 @@ class Predictor {
   [[nodiscard]] FullRate full_rate(const ModelPoint& model, std::size_t run) const;
 
  private:
+  struct Motions;
   struct Inputs;
+  std::shared_ptr<const Motions> motions_of(const ModelPoint& model, std::size_t run) const;
+  std::shared_ptr<const Motions> make_motions(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Inputs> inputs_of(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Inputs> make_inputs(const ModelPoint& model, std::size_t run) const;
-  void undo_angle_readings(const ModelPoint& model, std::size_t run, Inputs& in) const;
+  void undo_angle_readings(const ModelPoint& model, std::size_t run, Motions& in) const;
   void add_columns(std::size_t run, Inputs& in) const;
   /// At every sample, or at one of `every` where no effect has a memory.
   std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,

@@ -127,11 +127,57 @@ struct AngleReading {
   }
 };
 
+/// What of a model decides about something on one run: the effects that enter it and are there, with their values.
+template <typename Enters>
+std::vector<double> key_of(const ModelPoint& model, const PreparedRun& run, Enters&& enters) {
+  std::vector<double> key;
+  for (const Active& a : model.effects) {
+    const Hypothesis& h = *a.hypothesis;
+    if (!enters(h) || is_null(a)) continue;
+    if (is_slip(h) && !run.time.empty() && time_of(h, run, run.time.size() - 1) < a.values[kSlipMoment])
+      continue;  // it is still to come
+    key.push_back(h.effect);
+    key.push_back(h.clock == Clock::kDay ? 1 : 0);
+    key.insert(key.end(), a.values.begin(), a.values.end());
+  }
+  return key;
+}
+
+/// Of each run the parts of two models: most models of a search differ elsewhere. Two are kept, for a search goes back and forth between the
+/// model where it stands and others that read otherwise; the one that was never asked for again goes first.
+template <typename Part>
+class Kept {
+ public:
+  template <typename Make>
+  std::shared_ptr<const Part> of(std::size_t run, std::uint64_t predictor, std::vector<double> key,
+                                 Make&& make) {
+    if (runs_.size() <= run) runs_.resize(run + 1);
+    ++now_;
+    for (One& one : runs_[run])
+      if (one.part != nullptr && one.predictor == predictor && one.key == key) {
+        one.asked_again = now_;
+        return one.part;
+      }
+    One& other = runs_[run][runs_[run][0].asked_again <= runs_[run][1].asked_again ? 0 : 1];
+    other = {.predictor = predictor, .asked_again = 0, .key = std::move(key), .part = nullptr};
+    return other.part = make();
+  }
+
+ private:
+  struct One {
+    std::uint64_t predictor = 0, asked_again = 0;
+    std::vector<double> key;
+    std::shared_ptr<const Part> part;
+  };
+  std::vector<std::array<One, 2>> runs_;
+  std::uint64_t now_ = 0;
+};
+
 }  // namespace
 
 /// Offsets, gains and drifts are smooth: they can be undone in the low-passed signals. Jumps and play cannot. A joint that rests stands
 /// still however its reading drifts within a step of the encoder.
-void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, Inputs& in) const {
+void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, Motions& in) const {
   const PreparedRun& run = data_->runs[index];
   const bool rests = std::find(resting_.begin(), resting_.end(), index) != resting_.end();
   std::vector<const Active*> readings;
@@ -220,55 +266,35 @@ void Predictor::undo_angle_readings(const ModelPoint& model, std::size_t index, 
   if (slow) in.slow_acceleration = &in.own_slow_acceleration;
 }
 
-/// Inputs of the models on this run that changed them the same way: most models of a search differ elsewhere. Two are kept, for a search
-/// goes back and forth between the model where it stands and others that read otherwise; the one that was never asked for again goes first.
-std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
-                                                              std::size_t index) const {
+std::shared_ptr<const Predictor::Motions> Predictor::motions_of(const ModelPoint& model,
+                                                                std::size_t index) const {
+  thread_local Kept<Motions> kept;
   const PreparedRun& run = data_->runs[index];
-  std::vector<double> key;
-  for (const Active& a : model.effects) {
-    const Hypothesis& h = *a.hypothesis;
-    if (!(h.reads_angle || h.reads_pressure || h.info().hook == Hook::kMusclePressure) || is_null(a))
-      continue;
-    if (is_slip(h) && !run.time.empty() && time_of(h, run, run.time.size() - 1) < a.values[kSlipMoment])
-      continue;  // it is still to come
-    key.push_back(h.effect);
-    key.push_back(h.clock == Clock::kDay ? 1 : 0);
-    key.insert(key.end(), a.values.begin(), a.values.end());
-  }
-  struct Kept {
-    std::uint64_t predictor = 0, asked_again = 0;
-    std::vector<double> key;
-    std::shared_ptr<const Inputs> inputs;
-  };
-  thread_local std::vector<std::array<Kept, 2>> kept;
-  thread_local std::uint64_t now = 0;
-  if (kept.size() <= index) kept.resize(index + 1);
-  ++now;
-  for (Kept& k : kept[index])
-    if (k.inputs != nullptr && k.predictor == identity_ && k.key == key) {
-      k.asked_again = now;
-      return k.inputs;
-    }
-  Kept& other = kept[index][kept[index][0].asked_again <= kept[index][1].asked_again ? 0 : 1];
-  other = {.predictor = identity_, .asked_again = 0, .key = std::move(key), .inputs = nullptr};
-  other.inputs = make_inputs(model, index);
-  return other.inputs;
+  return kept.of(index, identity_, key_of(model, run, [](const Hypothesis& h) { return h.reads_angle; }),
+                 [&] { return make_motions(model, index); });
 }
 
-std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
-                                                                std::size_t index) const {
+std::shared_ptr<const Predictor::Inputs> Predictor::inputs_of(const ModelPoint& model,
+                                                              std::size_t index) const {
+  thread_local Kept<Inputs> kept;
   const PreparedRun& run = data_->runs[index];
-  auto shared = std::make_shared<Inputs>();
-  Inputs& in = *shared;
+  const auto enters = [](const Hypothesis& h) {
+    return h.reads_angle || h.reads_pressure || h.info().hook == Hook::kMusclePressure;
+  };
+  return kept.of(index, identity_, key_of(model, run, enters), [&] { return make_inputs(model, index); });
+}
+
+std::shared_ptr<const Predictor::Motions> Predictor::make_motions(const ModelPoint& model,
+                                                                  std::size_t index) const {
+  const PreparedRun& run = data_->runs[index];
+  auto shared = std::make_shared<Motions>();
+  Motions& in = *shared;
   in.angle = &run.angle;
   in.velocity = &run.velocity;
   in.acceleration = &run.acceleration;
   in.dry = &run.dry_velocity;
   in.slow_acceleration = &run.slow_acceleration;
   if (!run.swing.angle.empty()) in.swing = &run.swing;
-  in.pressure[0] = &run.pressure[0];
-  in.pressure[1] = &run.pressure[1];
   if (run.angle.empty()) return shared;
   const double dt = run.interval;
   double skew = 0;
@@ -323,6 +349,24 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
       in.swing = &in.own_swing;
     }
   }
+  return shared;
+}
+
+std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
+                                                                std::size_t index) const {
+  const PreparedRun& run = data_->runs[index];
+  auto shared = std::make_shared<Inputs>();
+  Inputs& in = *shared;
+  in.motions = motions_of(model, index);
+  in.angle = in.motions->angle;
+  in.velocity = in.motions->velocity;
+  in.acceleration = in.motions->acceleration;
+  in.dry = in.motions->dry;
+  in.slow_acceleration = in.motions->slow_acceleration;
+  in.swing = in.motions->swing;
+  in.pressure[0] = &run.pressure[0];
+  in.pressure[1] = &run.pressure[1];
+  if (run.angle.empty()) return shared;
   for (const Active& a : model.effects) {
     if (!run.has_pressure) break;
     const auto& info = a.hypothesis->info();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "isac/explain/predict.hpp"
@@ -89,15 +90,23 @@ struct BaselineOfPoint {
   return x;
 }
 
-/// What enters the equations: the measured signals, or what they were before sensors changed them.
-struct Predictor::Inputs {
+/// How the joint moved: as measured, or as it was before sensors changed it.
+struct Predictor::Motions {
   const std::vector<double>*angle = nullptr, *velocity = nullptr, *acceleration = nullptr, *dry = nullptr,
         *slow_acceleration = nullptr;
   const Motion* swing = nullptr;  ///< of a free joint; nullptr: angle, velocity and acceleration
-  const std::vector<double>* pressure[2] = {nullptr, nullptr};
-  std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration,
-      own_pressure[2];
+  std::vector<double> own_angle, own_velocity, own_acceleration, own_dry, own_slow_acceleration;
   Motion own_swing;
+};
+
+/// What enters the equations: that, and the pressures.
+struct Predictor::Inputs {
+  std::shared_ptr<const Motions> motions;
+  const std::vector<double>*angle = nullptr, *velocity = nullptr, *acceleration = nullptr, *dry = nullptr,
+        *slow_acceleration = nullptr;
+  const Motion* swing = nullptr;
+  const std::vector<double>* pressure[2] = {nullptr, nullptr};
+  std::vector<double> own_pressure[2];
   std::vector<double> columns;  ///< row-major: rows of the torque chain × terms
   mutable std::vector<double>
       terms;  ///< row-major: samples × terms, each with 1 for its parameter; empty until asked for

@@ -90,11 +90,11 @@ Around around(const Predictor& predictor, const Fit& fit, const Weights& weights
 
 namespace {
 
-/// Adds what tolerances with these slopes, held at a bound, take of `left` when they come back.
-void come_back(const Held& held, const Eigen::MatrixXd& slopes, Eigen::MatrixXd gram, Eigen::VectorXd& left) {
+/// How far tolerances come back whose slopes have this Gram matrix and go with what is left by `toward`.
+Eigen::VectorXd come_back(const Held& held, Eigen::MatrixXd gram, const Eigen::VectorXd& toward) {
   const double largest = std::max(gram.diagonal().maxCoeff(), 1e-300);
   for (Eigen::Index i = 0; i < gram.rows(); ++i) gram(i, i) += 1e-9 * gram(i, i) + 1e-12 * largest;
-  left += slopes * bounded_quadratic(gram, slopes.transpose() * left, held.low, held.high);
+  return bounded_quadratic(gram, toward, held.low, held.high);
 }
 
 }  // namespace
@@ -108,18 +108,42 @@ Eigen::MatrixXd Around::project_columns(const Eigen::MatrixXd& x) const {
 }
 
 Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
-  if (held.slopes.cols() > 0 && left.allFinite()) come_back(held, held.slopes, held_gram, left);
+  if (held.slopes.cols() > 0 && left.allFinite())
+    left += held.slopes * come_back(held, held_gram, held.slopes.transpose() * left);
   return left;
 }
 
 Eigen::VectorXd Around::left_beside(const Eigen::Ref<const Eigen::VectorXd>& x) const {
-  const double norm2 = x.squaredNorm();
-  if (!(norm2 > 0)) return release(residual);
-  Eigen::VectorXd left = residual - x * (x.dot(residual) / norm2);
-  if (held.slopes.cols() == 0 || !left.allFinite()) return left;
-  const Eigen::MatrixXd slopes = held.slopes - x * ((x.transpose() * held.slopes) / norm2);
-  come_back(held, slopes, slopes.transpose() * slopes, left);
-  return left;
+  const double norm = x.norm();
+  if (!(norm > 0)) return release(residual);
+  Beside beside(*this);
+  beside.take(x / norm);
+  return beside.left();
+}
+
+Beside::Beside(const Around& place)
+    : place_(place), held_(place.residual), slopes_(place.held.slopes), gram_(place.held_gram) {}
+
+double Beside::loss_with(const Eigen::VectorXd& unit) const {
+  const double along = unit.dot(held_), loss = held_.squaredNorm() - along * along;
+  if (slopes_.cols() == 0 || !std::isfinite(loss)) return loss;
+  const Eigen::VectorXd share = slopes_.transpose() * unit,
+                        toward = slopes_.transpose() * held_ - along * share;
+  const Eigen::MatrixXd gram = gram_ - share * share.transpose();
+  const Eigen::VectorXd back = come_back(place_.held, gram, toward);
+  return loss + 2 * toward.dot(back) + back.dot(gram * back);
+}
+
+void Beside::take(const Eigen::VectorXd& unit) {
+  held_ -= unit * unit.dot(held_);
+  if (slopes_.cols() == 0) return;
+  slopes_ -= unit * (unit.transpose() * slopes_);
+  gram_ = slopes_.transpose() * slopes_;
+}
+
+Eigen::VectorXd Beside::left() const {
+  if (slopes_.cols() == 0 || !held_.allFinite()) return held_;
+  return held_ + slopes_ * come_back(place_.held, gram_, slopes_.transpose() * held_);
 }
 
 namespace {

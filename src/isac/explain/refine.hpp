@@ -37,6 +37,25 @@ struct Around {
   [[nodiscard]] Eigen::VectorXd left_beside(const Eigen::Ref<const Eigen::VectorXd>& x) const;
 };
 
+/// A place's residual beside directions that are taken one after another, each at its best amplitude with the held tolerances come back as far
+/// as it and those before it let them.
+class Beside {
+ public:
+  explicit Beside(const Around& place);
+
+  /// The residual without what was taken, the tolerances still held.
+  [[nodiscard]] const Eigen::VectorXd& held() const noexcept { return held_; }
+  /// Square of what were left if this one, of unit length and orthogonal to those before it, was taken too.
+  [[nodiscard]] double loss_with(const Eigen::VectorXd& unit) const;
+  void take(const Eigen::VectorXd& unit);
+  [[nodiscard]] Eigen::VectorXd left() const;
+
+ private:
+  const Around& place_;
+  Eigen::VectorXd held_;
+  Eigen::MatrixXd slopes_, gram_;
+};
+
 [[nodiscard]] Around around(const Predictor& predictor, const Fit& fit, const Weights& weights);
 
 struct Refined {

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
+#include <vector>
 
+#include "isac/explain/any_lag.hpp"
 #include "isac/explain/constancy.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/moments.hpp"
 #include "isac/explain/search_run.hpp"
 #include "isac/explain/slip_moment.hpp"
 
@@ -28,6 +32,8 @@ constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06, kStrong = 2;
 // And of all that is significant, where it is not what is most significant: 0.12 had a right name in 107, 0.133 a drift of the encoder for a slip.
 constexpr double kWorthDoubtingOfAny = 0.125;
+// Of a chain's usual power, in moments that stand out beside a name: a right one left 0.026 at most of 208, a clipped force for a slack muscle 0.65.
+constexpr double kInMomentsBeside = 0.3;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
 /// Does the catalogue say that these two are taken for one another?
@@ -44,10 +50,19 @@ bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo
   return names(a, b.id) || names(b, a.id);
 }
 
+bool is_beaten(const Comparison& behind) {
+  return behind.separation >= kTwinLimit && behind.t >= kBeaten;
+}
+
+std::string sigma_ahead(const Comparison& behind) {
+  return fmt::format("{:.1f} sigma {}", std::abs(behind.t), behind.t > 0 ? "ahead" : "behind");
+}
+
 /// Of all steps between two runs the one that takes most from the torque.
 GenericFit best_step_between_runs(const Around& place) {
   const Prepared& data = place.predictor->data();
-  GenericFit best{.chain = Chain::kTorque, .functions = {}, .gain = 0, .residual = place.residual};
+  GenericFit best{
+      .chain = Chain::kTorque, .functions = {}, .of_reading = {}, .gain = 0, .residual = place.residual};
   for (std::size_t first = 1; first < data.runs.size(); ++first) {
     Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
     for (std::size_t i = 0; i < data.rows.size(); ++i)
@@ -90,16 +105,32 @@ void Search::hold_against_a_step() {
       behind.separation));
 }
 
+bool Search::are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of) {
+  std::string names;
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    names += (i > 0 ? " and " : "") + ranking_.id_of(found_.steps[i].trials.front());
+  if (!is_beaten(behind)) {
+    const bool alike = behind.separation < kTwinLimit;
+    say(fmt::format("{}: {}{} {} ({:.1f} sigma of data between them)", names, rivals, made_of,
+                    alike ? "leaves the same" : "is " + sigma_ahead(behind), behind.separation));
+    return false;
+  }
+  const std::string sentence = fmt::format("ruled out: {:.1f} sigma behind {}", behind.t, rivals);
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    found_.notes.push_back({ranking_.id_of(found_.steps[i].trials.front()), sentence});
+  say(names + ": " + sentence + made_of);
+  found_.adequate = false;
+  return true;
+}
+
 void Search::hold_against_functions() {
   const Around baseline = around(predictor_, found_.baseline, found_.weights);
-  const GenericFit generic = fit_generic(baseline, found_.steps.front().screen, options_.threads);
+  const GenericFit generic = rival_without_a_name(baseline, found_.steps.front().screen, options_.threads);
   if (generic.functions.empty()) return;
-  std::string names;
   int parameters = 0;
   unsigned common = kAllChains;  // readings that all of them enter: one function has only one
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const Trial& named = found_.steps[i].trials.front();
-    names += (i > 0 ? " and " : "") + ranking_.id_of(named);
     // Of those beyond the first, each was the best of many as well.
     parameters += ranking_.parameters_of(named) + (i > 0 ? kChoosingOne : 0);
     common &= together_with(chains_of(named));
@@ -107,27 +138,45 @@ void Search::hold_against_functions() {
   const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
                                                         : baseline.project(found_.model.residual);
   const Comparison behind = behind_generic(data_, left, parameters, generic);
-  if (generic.functions.size() < found_.added.size() && common != 0 && behind.separation < kTwinLimit)
+  const bool alike = behind.separation < kTwinLimit;
+  if (alike && generic.functions.size() < found_.added.size() && common != 0)
     found_.doubts.push_back(fmt::format(
         "Together they do no more than one function without a name ({:.1f} sigma of data between them): it "
         "may be one thing, and neither of them.",
         behind.separation));
-  if (behind.t < kBeaten || behind.separation < kTwinLimit) {
-    if (behind.separation >= kTwinLimit && behind.t > kCloserThanChance - 0.5 * behind.separation)
-      found_.doubts.push_back(fmt::format(
-          "Functions without a name do as well, or nearly: they are {:.1f} sigma {}, where {:.1f} sigma "
-          "of data lie between.",
-          std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
-    say(fmt::format("{}: functions without a name are {:.1f} sigma {} ({:.1f} sigma of data between them)",
-                    names, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
+  if (are_beaten(behind, "a fit without a name", " (" + names_of(generic, data_) + ")")) return;
+  if (!alike && behind.t > kCloserThanChance - 0.5 * behind.separation)
+    found_.doubts.push_back(
+        fmt::format("Functions without a name do as well, or nearly: they are {}, where {:.1f} sigma "
+                    "of data lie between.",
+                    sigma_ahead(behind), behind.separation));
+}
+
+void Search::hold_against_any_lag() {
+  if (!touches_pressures()) return;
+  const auto behind_it = [&](const Fit& fit) {
+    const Around beside = around(predictor_, fit, found_.weights);
+    const AnyLag lag = any_lag(beside, options_.threads);
+    return lag.taps > 0 ? std::optional(behind_any_lag(beside, lag)) : std::nullopt;
+  };
+  const std::optional<Comparison> behind = behind_it(found_.model);
+  if (!behind) return;
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const bool alone = found_.added.size() == 1 && found_.steps.size() == 2;
+  for (std::size_t i = 1; alone && is_beaten(*behind) && i < trials.size(); ++i) {
+    if (!trials[i].in_set || (chains_of(trials[i]) & kPressureChains) == 0) continue;
+    Fit other = with({trials[i]});
+    if (is_beaten(behind_it(other).value_or(*behind))) continue;
+    say(fmt::format("a valve unit whose lag has any shape is {} of {}, not of {}: that takes its place",
+                    sigma_ahead(*behind), ranking_.id_of(trials.front()), ranking_.id_of(trials[i])));
+    put_first(i);
+    found_.added.front() = trials.front().hypothesis;
+    move_to(other);
+    found_.steps.back() = step_here();
+    found_.adequate = !is_open(found_.steps.back());
     return;
   }
-  const std::string sentence =
-      fmt::format("ruled out: {:.1f} sigma behind functions that have no name", behind.t);
-  for (std::size_t i = 0; i < found_.added.size(); ++i)
-    found_.notes.push_back({ranking_.id_of(found_.steps[i].trials.front()), sentence});
-  say(names + ": " + sentence);
-  found_.adequate = false;
+  (void)are_beaten(*behind, "a valve unit whose lag has any shape");
 }
 
 void Search::hold_against_itself() {
@@ -175,6 +224,19 @@ void Search::look_at_remainder() {
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, much ? left.size : gate.size));
+  say(found_.doubts.back());
+}
+
+void Search::look_at_moments_beside() {
+  if (!found_.adequate || found_.added.empty()) return;
+  const Moments moments = moments_of(data_, found_.model.residual);
+  if (moments.share < kInMomentsBeside) return;
+  const Label label = label_of(data_, moments.chain);
+  found_.doubts.push_back(
+      fmt::format("In a few moments the {} is off beside it as noise is nowhere else, most of all near "
+                  "{:.1f} s of {}, {:.0f} times in mean "
+                  "square.",
+                  in_words(label), moments.time, data_.runs[moments.run].name, moments.times_usual));
   say(found_.doubts.back());
 }
 

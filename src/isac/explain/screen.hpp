@@ -167,6 +167,8 @@ class Dictionary {
   [[nodiscard]] std::size_t size() const noexcept;
   [[nodiscard]] std::string name(std::size_t column) const;  ///< "torque: sgn |angle|"
   [[nodiscard]] Chain chain(std::size_t column) const;
+  /// The same function in another chain, which the data must have.
+  [[nodiscard]] std::size_t in(std::size_t column, Chain chain) const;
   [[nodiscard]] std::vector<std::string> variables(std::size_t column) const;
   [[nodiscard]] Eigen::VectorXd rows(std::size_t column) const;
   /// All functions of one chain, a column each, in the rows `of` that chain.

@@ -47,8 +47,10 @@ Found Search::run() {
   if (found_.added.size() > 1) swap_and_drop();
   if (found_.adequate && !found_.added.empty()) hold_against_functions();
   if (found_.adequate && !found_.added.empty()) hold_against_a_step();
+  if (found_.adequate && !found_.added.empty()) hold_against_any_lag();
   if (found_.adequate && !found_.added.empty()) hold_against_itself();
   look_at_remainder();
+  look_at_moments_beside();
   if (found_.adequate) leave_half_a_step(false);
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
   if (untold_half_step_ > 0)  // it stayed in the middle, and the intervals know how far it may be off

@@ -140,6 +140,7 @@ class Search {
   /// Where a force's reading is clipped, rows of the torque are not linear in the baseline, and off which it was projected holds nearby only: a rival that
   /// moves it far (a gain of the encoder for an added inertia) is refitted with it before it is ruled out.
   void fit_with_the_baseline(std::vector<Trial>& trials) const;
+  Trial refit_one(const Screened& candidate) const;
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const;
   /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
   bool is_open_at_least(const Step& step, double size) const;
@@ -177,6 +178,10 @@ class Search {
   // What casts doubt on a name: remainder.cpp.
   /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
   void hold_against_functions();
+  /// What stands for the valve unit's dynamics may be another lag, with no name; a rival of the name that is such a lag takes its place.
+  void hold_against_any_lag();
+  /// Rules the names out where rivals without a name are ahead of them.
+  bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of = "");
   /// What moves with the time of the day may have happened at once, between two runs.
   void hold_against_a_step();
   /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
@@ -186,6 +191,8 @@ class Search {
   /// A name that stands only as what it turns into at the end of its range, two sensors that err by the same, and a crowd of effects may each
   /// be one thing that the catalogue does not have.
   void look_at_limits();
+  /// A few moments that stand out beside a name are something else, or the name is wrong.
+  void look_at_moments_beside();
 
   const Predictor& predictor_;
   Library& library_;

@@ -214,27 +214,38 @@ void Search::choose_moment(Step& step) const {
   }
 }
 
+Trial Search::refit_one(const Screened& candidate) const {
+  if (first_here_ && first_here_->hypothesis == candidate.hypothesis && first_start_ == candidate.start)
+    return *first_here_;
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(candidate.hypothesis)];
+  Refined refined = refine(place_, h, candidate.start);
+  // Where the linear start was a bad one, the shape's own values are another.
+  if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * candidate.gain) {
+    Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(candidate.shape)]);
+    if (other.loss < refined.loss) refined = std::move(other);
+  }
+  Trial trial;
+  trial.hypothesis = candidate.hypothesis;
+  trial.values = refined.values;
+  trial.residual = std::move(refined.residual);
+  trial.loss = refined.loss;
+  trial.material = size_over_floor(data_, found_.weights, found_.floors, trial.residual - place_.residual);
+  return trial;
+}
+
 std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
+  // An effect of the valves that is no linear one takes ten times as long as the others: a single one has all threads for its runs.
+  const auto is_slow = [&](const Screened& c) {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
+    return !h.info().linear && (h.chains & kPressureChains) != 0;
+  };
   std::vector<Trial> trials(list.size());
-  share_work(options_.threads, list.size(), [&](std::size_t i) {
-    if (first_here_ && first_here_->hypothesis == list[i].hypothesis && first_start_ == list[i].start) {
-      trials[i] = *first_here_;
-      return;
-    }
-    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(list[i].hypothesis)];
-    Refined refined = refine(place_, h, list[i].start);
-    // Where the linear start was a bad one, the shape's own values are another.
-    if (!h.info().linear && refined.loss > place_.residual.squaredNorm() - 0.5 * list[i].gain) {
-      Refined other = refine(place_, h, h.shapes[static_cast<std::size_t>(list[i].shape)]);
-      if (other.loss < refined.loss) refined = std::move(other);
-    }
-    trials[i].hypothesis = list[i].hypothesis;
-    trials[i].values = refined.values;
-    trials[i].residual = std::move(refined.residual);
-    trials[i].loss = refined.loss;
-    trials[i].material =
-        size_over_floor(data_, found_.weights, found_.floors, trials[i].residual - place_.residual);
-  });
+  std::vector<std::size_t> shared, slow;
+  for (std::size_t i = 0; i < list.size(); ++i) (is_slow(list[i]) ? slow : shared).push_back(i);
+  if (slow.size() > 1) shared.insert(shared.end(), slow.begin(), slow.end());
+  share_work(options_.threads, shared.size(),
+             [&](std::size_t k) { trials[shared[k]] = refit_one(list[shared[k]]); });
+  if (slow.size() == 1) trials[slow.front()] = refit_one(list[slow.front()]);
   return trials;
 }
 
