@@ -147,9 +147,10 @@ TEST(AnyLag, has_no_taps_where_nothing_was_commanded) {
   for (series::Recording& run : runs)
     std::erase_if(run.columns, [](const auto& c) { return c.name == "p1_cmd" || c.name == "p2_cmd"; });
   const Prepared data = prepare(runs, rig.facts(), {}, 4.0);
+  const Library library = make_library(data);
   const Predictor predictor(data);
   const Weights weights;
-  const Fit fit = fit_baseline(predictor, make_library(data).tolerances, weights);
+  const Fit fit = fit_baseline(predictor, library.tolerances, weights);
   const Around place = around(predictor, fit, weights);
   const AnyLag lag = any_lag(place);
   EXPECT_EQ(lag.taps, 0);
