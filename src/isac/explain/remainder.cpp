@@ -20,6 +20,8 @@ namespace {
 constexpr double kBeaten = 1.645;  // sigma, by functions without a name
 // Sigma more than chance has seldom: were the name right, functions would be half of what lies between the two behind.
 constexpr double kCloserThanChance = 1.28;
+// Of what a name closes, in units of noise: no equation is truer than that. Right names that functions came close to had 0.007 at most, wrong ones 0.03.
+constexpr double kWorthComparing = 0.01;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
@@ -145,7 +147,9 @@ void Search::hold_against_functions() {
         "may be one thing, and neither of them.",
         behind.separation));
   if (are_beaten(behind, "a fit without a name", " (" + names_of(generic, data_) + ")")) return;
-  if (!alike && behind.t > kCloserThanChance - 0.5 * behind.separation)
+  const double closed = (baseline.residual.squaredNorm() - left.squaredNorm()) / behind.unit,
+               between = behind.separation * behind.separation;
+  if (!alike && between >= kWorthComparing * closed && behind.t > kCloserThanChance - 0.5 * behind.separation)
     found_.doubts.push_back(
         fmt::format("Functions without a name do as well, or nearly: they are {}, where {:.1f} sigma "
                     "of data lie between.",
