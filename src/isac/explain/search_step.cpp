@@ -22,6 +22,7 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kWorthALook = 0.5;    // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;   // of the linear gain
 constexpr double kNearlyAsWell = 0.6;  // of the gain: another moment of a slip
+constexpr double kNear = 0.7, kFarUnits = 400;  // of the best gain, and units of noise
 
 }  // namespace
 
@@ -181,7 +182,9 @@ std::vector<Screened> Search::shortlist(const Screen& s) const {
     list.push_back(c);
     if (h.id() == "encoder_slip") slip = c;
   }
-  if (slip) add_other_moments(*slip, s, list);
+  // Far behind what takes most, no other moment is nearer: each takes less.
+  if (slip && (slip->gain > kNear * best || best - slip->gain < kFarUnits * s.noise_unit))
+    add_other_moments(*slip, s, list);
   return list;
 }
 
