@@ -259,14 +259,25 @@ struct Dictionary::At {
 };
 
 Eigen::VectorXd Dictionary::rows(std::size_t column) const {
-  const auto& value = functions()[column % functions().size()].value;
+  return rows(std::vector<std::size_t>{column});
+}
+
+Eigen::MatrixXd Dictionary::rows(const std::vector<std::size_t>& columns) const {
+  std::vector<Eigen::Index> of_chain[kChains];
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    of_chain[static_cast<int>(chain(columns[c]))].push_back(static_cast<Eigen::Index>(c));
   const At at{*data_, *signals_};
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_->rows.size()));
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data_->rows.size()),
+                                              static_cast<Eigen::Index>(columns.size()));
   for (std::size_t i = 0; i < data_->rows.size(); ++i) {
     const Row& row = data_->rows[i];
-    if (row.chain != chain(column)) continue;
-    const double v = value(at(row));
-    out[static_cast<Eigen::Index>(i)] = std::isfinite(v) ? v : 0.0;
+    const std::vector<Eigen::Index>& asked = of_chain[static_cast<int>(row.chain)];
+    if (asked.empty()) continue;
+    const Scaled s = at(row);
+    for (const Eigen::Index c : asked) {
+      const double v = functions()[columns[static_cast<std::size_t>(c)] % functions().size()].value(s);
+      if (std::isfinite(v)) out(static_cast<Eigen::Index>(i), c) = v;
+    }
   }
   return out;
 }

@@ -224,14 +224,15 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
 
   // Torque = its base, generic functions of quiet signals, and the bands.
   const Dictionary generic(data);
-  std::vector<Eigen::Index> at;
-  for (std::size_t i = 0; i < data.rows.size(); ++i)
-    if (data.rows[i].chain == Chain::kTorque && !parts[data.rows[i].run].by_rule[0].empty())
-      at.push_back(static_cast<Eigen::Index>(i));
+  std::vector<Eigen::Index> of_torque, at,
+      kept;  // rows of the torque; those with all parts, and where they are among them
+  const Eigen::MatrixXd functions = generic.rows_of(Chain::kTorque, of_torque);
+  for (std::size_t i = 0; i < of_torque.size(); ++i)
+    if (!parts[data.rows[static_cast<std::size_t>(of_torque[i])].run].by_rule[0].empty()) {
+      at.push_back(of_torque[i]);
+      kept.push_back(static_cast<Eigen::Index>(i));
+    }
   const auto n = static_cast<Eigen::Index>(at.size());
-  std::vector<Eigen::VectorXd> columns;
-  for (std::size_t c = 0; c < generic.size(); ++c)
-    if (generic.chain(c) == Chain::kTorque) columns.push_back(generic.rows(c)(at));
   Eigen::VectorXd y(n), cubed(n);
   Eigen::MatrixXd bands(n, kBands);
   const double gain = pressure_gain * data.rig.wheel_radius;
@@ -244,9 +245,9 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
       bands(i, b) =
           0.5 * gain * (parts[row.run].rest[1][b][row.sample] - parts[row.run].rest[0][b][row.sample]);
   }
-  Eigen::MatrixXd x(n, static_cast<Eigen::Index>(columns.size()) + 1);
-  for (std::size_t c = 0; c < columns.size(); ++c) x.col(static_cast<Eigen::Index>(c)) = columns[c];
-  x.col(x.cols() - 1) = cubed;
+  Eigen::MatrixXd x(n, functions.cols() + 1);
+  x.leftCols(functions.cols()) = functions(kept, Eigen::all);
+  x.col(functions.cols()) = cubed;
   const bool enough = n > 20 * (x.cols() + kBands);
   if (enough) {
     Eigen::MatrixXd of(n, kBands + 1);

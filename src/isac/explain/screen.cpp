@@ -179,6 +179,7 @@ class Screening {
   Done dictionary(std::size_t first, std::size_t last) const {
     Eigen::MatrixXd x(rows(), static_cast<Eigen::Index>(last - first));
     std::vector<Eigen::Index> fresh;
+    std::vector<std::size_t> asked;
     for (std::size_t d = first; d < last; ++d) {
       const auto column = static_cast<Eigen::Index>(d - first);
       const Eigen::VectorXf* known = kept_ != nullptr ? &kept_->function(d) : nullptr;
@@ -186,11 +187,11 @@ class Screening {
         x.col(column) = known->cast<double>();
         continue;
       }
-      x.col(column) = generic_.rows(d);
       fresh.push_back(column);
+      asked.push_back(d);
     }
     if (!fresh.empty()) {
-      Eigen::MatrixXd weighed = x(Eigen::all, fresh);
+      Eigen::MatrixXd weighed = generic_.rows(asked);
       weigh(data_, *place_.weights, weighed);
       x(Eigen::all, fresh) = weighed;
       for (const Eigen::Index column : fresh)

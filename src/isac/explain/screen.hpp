@@ -171,6 +171,8 @@ class Dictionary {
   [[nodiscard]] std::size_t in(std::size_t column, Chain chain) const;
   [[nodiscard]] std::vector<std::string> variables(std::size_t column) const;
   [[nodiscard]] Eigen::VectorXd rows(std::size_t column) const;
+  /// Several side by side; a row's signals are scaled once for all of them.
+  [[nodiscard]] Eigen::MatrixXd rows(const std::vector<std::size_t>& columns) const;
   /// All functions of one chain, a column each, in the rows `of` that chain.
   [[nodiscard]] Eigen::MatrixXd rows_of(Chain chain, std::vector<Eigen::Index>& of) const;
 
