@@ -25,7 +25,6 @@ constexpr double kWorthComparing = 0.01;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
-constexpr double kDoubtfulOfAPair = 0.1;  // of two that took the place of one which would nearly have done
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
                  kWorthDoubtingOfPressureIfSeldom = 0.015;
@@ -83,12 +82,12 @@ GenericFit best_step_between_runs(const Around& place) {
 
 }  // namespace
 
-void Search::hold_against_a_step() {
+void Search::hold_against_a_step(const Around& baseline) {
   if (found_.added.size() != 1) return;
   const Trial& named = found_.steps.front().trials.front();
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(named.hypothesis)];
   if (h.clock != Clock::kDay || is_slip(h) || !data_.has(Chain::kTorque)) return;
-  const GenericFit step = best_step_between_runs(around(predictor_, found_.baseline, found_.weights));
+  const GenericFit step = best_step_between_runs(baseline);
   if (step.functions.empty()) return;
   const Comparison behind = behind_generic(data_, named.residual, ranking_.parameters_of(named), step);
   say(fmt::format("{}: a step between two runs is {:.1f} sigma {} ({:.1f} sigma of data between them)",
@@ -125,8 +124,7 @@ bool Search::are_beaten(const Comparison& behind, const std::string& rivals, con
   return true;
 }
 
-void Search::hold_against_functions() {
-  const Around baseline = around(predictor_, found_.baseline, found_.weights);
+void Search::hold_against_functions(const Around& baseline) {
   const GenericFit generic = rival_without_a_name(baseline, found_.steps.front().screen, options_.threads);
   if (generic.functions.empty()) return;
   int parameters = 0;
@@ -183,8 +181,7 @@ void Search::hold_against_any_lag() {
   (void)are_beaten(*behind, "a valve unit whose lag has any shape");
 }
 
-void Search::hold_against_itself() {
-  const Around baseline = around(predictor_, found_.baseline, found_.weights);
+void Search::hold_against_itself(const Around& baseline) {
   const double closed = baseline.project(found_.model.residual - found_.baseline.residual).norm();
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const std::size_t effect = found_.model.tolerances + i;
@@ -222,9 +219,7 @@ void Search::look_at_remainder() {
   const bool much = left.size >= (pressure ? of_pressure : of_torque) * first_size_,
              much_elsewhere = data_.baseline.terms.empty() && p <= kSeldom &&
                               gate.size >= kWorthDoubtingOfAny * first_size_;
-  if (p > (found_.another_pair ? kDoubtfulOfAPair : kDoubtful) ||
-      !(much || much_elsewhere || found_.another_pair))
-    return;
+  if (p > kDoubtful || !(much || much_elsewhere)) return;
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, much ? left.size : gate.size));
@@ -271,6 +266,10 @@ void Search::look_at_limits() {
             fmt::format("{} and {} are like one another: one effect that is neither may look like both.",
                         upper_first(info(k).term), info(i).term));
     }
+  if (found_.another_pair && found_.added.size() == 2)
+    found_.doubts.emplace_back(
+        "Together they took the place of one effect that nearly did: one that the catalogue does not have "
+        "may be like both.");
   if (found_.added.size() >= kMany)
     found_.doubts.push_back(fmt::format(
         "It takes {} effects together: one that none of them is may look like that.", found_.added.size()));

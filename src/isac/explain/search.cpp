@@ -45,10 +45,7 @@ Found Search::run() {
   if (found_.adequate && found_.added.empty() && !found_.steps.empty()) doubt_the_clock();
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
   if (found_.added.size() > 1) swap_and_drop();
-  if (found_.adequate && !found_.added.empty()) hold_against_functions();
-  if (found_.adequate && !found_.added.empty()) hold_against_a_step();
-  if (found_.adequate && !found_.added.empty()) hold_against_any_lag();
-  if (found_.adequate && !found_.added.empty()) hold_against_itself();
+  if (found_.adequate && !found_.added.empty()) hold_against_others();
   look_at_remainder();
   look_at_moments_beside();
   if (found_.adequate) leave_half_a_step(false);
@@ -58,6 +55,14 @@ Found Search::run() {
   look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
   return std::move(found_);
+}
+
+void Search::hold_against_others() {
+  const Around baseline = around(predictor_, found_.baseline, found_.weights);
+  hold_against_functions(baseline);
+  if (found_.adequate) hold_against_a_step(baseline);
+  if (found_.adequate) hold_against_any_lag();
+  if (found_.adequate) hold_against_itself(baseline);
 }
 
 void Search::take_first_colour() {

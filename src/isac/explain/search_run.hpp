@@ -175,17 +175,19 @@ class Search {
   /// Each effect is given up once, with the others in place: another may do better, or nothing may be missed.
   void swap_and_drop();
 
+  /// All of the following, one after another, until the names are ruled out.
+  void hold_against_others();
   // What casts doubt on a name: remainder.cpp.
   /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
-  void hold_against_functions();
+  void hold_against_functions(const Around& baseline);
   /// What stands for the valve unit's dynamics may be another lag, with no name; a rival of the name that is such a lag takes its place.
   void hold_against_any_lag();
   /// Rules the names out where rivals without a name are ahead of them.
   bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of = "");
   /// What moves with the time of the day may have happened at once, between two runs.
-  void hold_against_a_step();
+  void hold_against_a_step(const Around& baseline);
   /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
-  void hold_against_itself();
+  void hold_against_itself(const Around& baseline);
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
   void look_at_remainder();
   /// A name that stands only as what it turns into at the end of its range, two sensors that err by the same, and a crowd of effects may each
