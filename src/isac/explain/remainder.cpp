@@ -161,7 +161,13 @@ void Search::hold_against_any_lag() {
     const AnyLag lag = any_lag(beside, options_.threads);
     return lag.taps > 0 ? std::optional(behind_any_lag(beside, lag)) : std::nullopt;
   };
-  const std::optional<Comparison> behind = behind_it(found_.model);
+  // By themselves: pressures know nothing of the others, and a threshold in the torque is a staircase on which a joint fit may stop.
+  std::vector<Trial> of_valves;
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    if ((chains_of(found_.steps[i].trials.front()) & kPressureChains) != 0)
+      of_valves.push_back(found_.steps[i].trials.front());
+  const bool all = of_valves.size() == found_.added.size();
+  const std::optional<Comparison> behind = behind_it(all ? found_.model : with(of_valves));
   if (!behind) return;
   std::vector<Trial>& trials = found_.steps.front().trials;
   const bool alone = found_.added.size() == 1 && found_.steps.size() == 2;
