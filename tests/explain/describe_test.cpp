@@ -293,6 +293,21 @@ TEST(VariableWords, call_a_variable_by_the_word_of_its_axis) {
   EXPECT_TRUE(summary_of(e).ends_with("pressure p1 and position x.")) << summary_of(e);
 }
 
+TEST(Summary, says_which_name_came_nearest_to_an_unknown_effect_and_what_ruled_it_out) {
+  Explanation e;
+  e.verdict = Verdict::kUnknown;
+  e.rejected.emplace_back().id = "second_order_lag";
+  e.rejected.front().name = "second lag";
+  e.trials = {{"second_order_lag", "fits best"},
+              {"second_order_lag", "ruled out: 2.8 sigma behind another"},
+              {"dead_time", "ruled out: 9.1 sigma behind second_order_lag"}};
+  const std::string nearest = " Second lag came nearest and is ruled out: 2.8 sigma behind another.";
+  EXPECT_TRUE(summary_of(e).ends_with(nearest)) << summary_of(e);
+  e.trials.pop_back();
+  e.trials.pop_back();  // nothing ruled it out that was told
+  EXPECT_EQ(summary_of(e).find("nearest"), std::string::npos) << summary_of(e);
+}
+
 TEST(WithError, gives_as_many_places_as_the_error_has) {
   EXPECT_EQ(with_error("T_c", 0.009812, 0.00041, "N m"), "T_c = 0.0098 ± 0.0004 N m");
   EXPECT_EQ(with_error("g", 0.031234, 0.0012, "-"), "g = 0.0312 ± 0.0012");
