@@ -33,7 +33,8 @@ constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06, kStrong = 2;
 // And of all that is significant, where it is not what is most significant: 0.12 had a right name in 107, 0.133 a drift of the encoder for a slip.
 constexpr double kWorthDoubtingOfAny = 0.125;
-// Of a chain's usual power, in moments that stand out beside a name: a right one left 0.026 at most of 208, a clipped force for a slack muscle 0.65.
+// Of a chain's usual power, in moments that stand out beside a name: of 208 right ones two left more than 0.06, 0.21 and less than 0.3; a clipped force for
+// a slack muscle 0.65.
 constexpr double kInMomentsBeside = 0.3;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
