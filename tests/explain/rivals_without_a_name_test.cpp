@@ -78,7 +78,7 @@ TEST(GenericFit, tells_an_error_of_the_force_sensors_by_torque_and_motion_togeth
   EXPECT_GT(behind("encoder_drift").t, 3);
 }
 
-TEST(GenericFit, takes_the_function_that_leaves_least_once_tolerances_come_back) {
+TEST(Beside, leaves_of_two_directions_what_it_promised_with_the_tolerances_come_back) {
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   const auto draw = [&](Eigen::Index cols) {

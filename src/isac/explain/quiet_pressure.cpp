@@ -224,8 +224,8 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
 
   // Torque = its base, generic functions of quiet signals, and the bands.
   const Dictionary generic(data);
-  std::vector<Eigen::Index> of_torque, at,
-      kept;  // rows of the torque; those with all parts, and where they are among them
+  std::vector<Eigen::Index> of_torque;
+  std::vector<Eigen::Index> at, kept;  // rows with all parts, and where they are among those of the torque
   const Eigen::MatrixXd functions = generic.rows_of(Chain::kTorque, of_torque);
   for (std::size_t i = 0; i < of_torque.size(); ++i)
     if (!parts[data.rows[static_cast<std::size_t>(of_torque[i])].run].by_rule[0].empty()) {
