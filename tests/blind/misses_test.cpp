@@ -136,7 +136,11 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"leave-one-out", "white", "force_drift", "6201", R"("verdict":"unknown")",
              "a drift of the encoder, for three free runs told of it and no test of blocks believes three"},
         Miss{"leave-one-out", "white", "tension_loss", "6201", R"("verdict":"not_separable")",
-             "a clipped force, for moments were asked only where nothing was named"}));
+             "a clipped force, for moments were asked only where nothing was named"},
+        Miss{"leave-one-out", "coloured", "valve_deadband", "8101", R"("verdict":"unknown")",
+             "a spool's stiction, for no lag is like what it left over and slow noise took the rest"},
+        Miss{"leave-one-out", "real", "asymmetric_hysteresis", "8101", R"("verdict":"not_separable")",
+             "a hysteresis that is alike in both directions, half a step of the encoder making up for it"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

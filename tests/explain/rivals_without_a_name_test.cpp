@@ -1,11 +1,12 @@
-// What a name is held against that has none: functions of the signals, errors of what the force sensors read, lags of any shape.
+// What a name is held against that has none: functions of the signals, errors of what the force sensors read, valve units with
+// a lag of any shape or a curve of any form.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
-#include "isac/explain/any_lag.hpp"
+#include "isac/explain/any_valve.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/screen.hpp"
@@ -106,8 +107,8 @@ TEST(Beside, leaves_of_two_directions_what_it_promised_with_the_tolerances_come_
   }
 }
 
-/// The name refitted with everything free, and how far it is behind a lag of any shape beside it.
-Comparison behind_any_lag(const Seen& seen, std::string_view form) {
+/// The name refitted with everything free, and how far it is behind a valve unit of the rival's form beside it.
+Comparison behind(AnyValve (*rival)(const Around&, int), const Seen& seen, std::string_view form) {
   const auto best =
       std::find_if(seen.screened.candidates.begin(), seen.screened.candidates.end(), [&](const Screened& c) {
         return seen.fitted.library.hypotheses[static_cast<std::size_t>(c.hypothesis)].info().id == form;
@@ -117,9 +118,9 @@ Comparison behind_any_lag(const Seen& seen, std::string_view form) {
   const Fit fit = refit(seen.fitted.predictor, seen.fitted.baseline,
                         {{&h, refine(seen.place, h, best->start).values}}, seen.fitted.weights, 8);
   const Around place = around(seen.fitted.predictor, fit, seen.fitted.weights);
-  const AnyLag lag = any_lag(place);
-  EXPECT_EQ(lag.taps, 6);
-  return isac::explain::behind_any_lag(place, lag);
+  const AnyValve any = rival(place, 1);
+  EXPECT_EQ(any.columns, 6);
+  return behind_any_valve(place, any);
 }
 
 TEST(AnyLag, tells_a_dead_time_from_a_second_lag_whichever_was_named) {
@@ -127,8 +128,8 @@ TEST(AnyLag, tells_a_dead_time_from_a_second_lag_whichever_was_named) {
     test::TiedRig rig;
     (dead ? rig.dead_time : rig.second_lag) = 0.008;
     const Seen seen(rig);
-    const Comparison right = behind_any_lag(seen, dead ? "dead_time" : "second_order_lag"),
-                     wrong = behind_any_lag(seen, dead ? "second_order_lag" : "dead_time");
+    const Comparison right = behind(any_lag, seen, dead ? "dead_time" : "second_order_lag"),
+                     wrong = behind(any_lag, seen, dead ? "second_order_lag" : "dead_time");
     EXPECT_LT(right.t, 1.28 - 0.5 * right.separation);
     EXPECT_GT(wrong.t, 1.645);
     EXPECT_GT(wrong.separation, 3);
@@ -136,12 +137,30 @@ TEST(AnyLag, tells_a_dead_time_from_a_second_lag_whichever_was_named) {
 }
 
 TEST(AnyLag, takes_nothing_from_a_right_name_that_is_no_linear_lag) {
-  const Comparison behind =
-      behind_any_lag(Seen(test::TiedRig{.deadband = 0.02 * kPascalPerKgfCm2}), "valve_deadband");
-  EXPECT_LT(behind.t, 0);
+  const Comparison right =
+      behind(any_lag, Seen(test::TiedRig{.deadband = 0.02 * kPascalPerKgfCm2}), "valve_deadband");
+  EXPECT_LT(right.t, 0);
 }
 
-TEST(AnyLag, has_no_taps_where_nothing_was_commanded) {
+TEST(AnyCurve, tells_a_valve_that_does_not_answer_small_errors_from_a_spool_that_sticks) {
+  const Seen seen(test::TiedRig{.deadband = 0.02 * kPascalPerKgfCm2});
+  const Comparison right = behind(any_curve, seen, "valve_deadband"),
+                   wrong = behind(any_curve, seen, "valve_hysteresis");
+  EXPECT_LT(right.t, 1.28 - 0.5 * right.separation);
+  EXPECT_GT(wrong.t, 1.645);
+  EXPECT_GT(wrong.separation, 3);
+}
+
+TEST(AnyCurve, takes_nothing_from_a_right_name_that_is_a_lag) {
+  for (const bool dead : {true, false}) {
+    test::TiedRig rig;
+    (dead ? rig.dead_time : rig.second_lag) = 0.008;
+    const Comparison right = behind(any_curve, Seen(rig), dead ? "dead_time" : "second_order_lag");
+    EXPECT_LT(right.t, 1.28 - 0.5 * right.separation) << dead;
+  }
+}
+
+TEST(AnyValve, has_no_columns_where_nothing_was_commanded) {
   const test::TiedRig rig{.dry = 0.03};
   auto runs = test::record_all(rig, day());
   for (series::Recording& run : runs)
@@ -152,9 +171,11 @@ TEST(AnyLag, has_no_taps_where_nothing_was_commanded) {
   const Weights weights;
   const Fit fit = fit_baseline(predictor, library.tolerances, weights);
   const Around place = around(predictor, fit, weights);
-  const AnyLag lag = any_lag(place);
-  EXPECT_EQ(lag.taps, 0);
-  EXPECT_EQ(lag.residual, place.residual);
+  for (const auto rival : {any_lag, any_curve}) {
+    const AnyValve any = rival(place, 1);
+    EXPECT_EQ(any.columns, 0);
+    EXPECT_EQ(any.residual, place.residual);
+  }
 }
 
 }  // namespace

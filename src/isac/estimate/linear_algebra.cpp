@@ -22,6 +22,12 @@ MatrixXd inverse_symmetric(const MatrixXd& a) {
   return solve_symmetric_each(a, MatrixXd::Identity(a.rows(), a.cols()));
 }
 
+MatrixXd gram_of(const MatrixXd& x) {
+  MatrixXd lower = MatrixXd::Zero(x.cols(), x.cols());
+  lower.selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
+  return lower.selfadjointView<Eigen::Lower>();
+}
+
 MatrixXd inverse_square(const MatrixXd& a) {
   return a.inverse();
 }

@@ -16,6 +16,9 @@ Eigen::MatrixXd solve_symmetric_each(const Eigen::MatrixXd& a, const Eigen::Matr
 /// A⁻¹ by the same factors.
 Eigen::MatrixXd inverse_symmetric(const Eigen::MatrixXd& a);
 
+/// XᵀX of an m × n matrix, by half of a product's work.
+Eigen::MatrixXd gram_of(const Eigen::MatrixXd& x);
+
 /// A⁻¹ of any square matrix (LU with partial pivots); what is not finite in it says that A is singular.
 Eigen::MatrixXd inverse_square(const Eigen::MatrixXd& a);
 

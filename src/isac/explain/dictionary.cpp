@@ -307,7 +307,7 @@ GenericFunctions::GenericFunctions(const Prepared& data, int threads) {
     OfChain of;
     of.x = generic.rows_of(chain, of.at);
     if (of.x.rows() < 20 * of.x.cols()) return;
-    of.gram = of.x.transpose() * of.x;
+    of.gram = estimate::gram_of(of.x);
     // Nearly dependent functions, and those that the data does not move, must not blow up.
     for (Eigen::Index i = 0; i < of.gram.cols(); ++i) of.gram(i, i) = of.gram(i, i) * (1 + 1e-6) + 1e-9;
     chains_[c] = std::move(of);

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "isac/explain/bounded_fit.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -157,6 +158,21 @@ void slope_of(const Predictor& predictor, const ModelPoint& model, const Eigen::
   }
 }
 
+/// Weighted slopes, a column for each coordinate, whose values are `value(j)`.
+template <class Value>
+Eigen::MatrixXd slopes_of(const Predictor& predictor, const ModelPoint& model, const Eigen::VectorXd& here,
+                          const Weights& weights, const std::vector<Coordinate>& coordinates,
+                          const Value& value) {
+  Eigen::MatrixXd slopes(here.size(), static_cast<Eigen::Index>(coordinates.size()));
+  share_work(predictor.threads(), coordinates.size(), [&](std::size_t j) {
+    Eigen::VectorXd column;
+    slope_of(predictor, model, here, coordinates[j], value(j), column);
+    slopes.col(static_cast<Eigen::Index>(j)) = column;
+  });
+  weigh(predictor.data(), weights, slopes, predictor.threads());
+  return slopes;
+}
+
 class Rows final : public ceres::CostFunction {
  public:
   Rows(const Predictor& predictor, ModelPoint model, std::vector<Coordinate> coordinates,
@@ -184,14 +200,9 @@ class Rows final : public ceres::CostFunction {
     for (Eigen::Index i = 0; i < n; ++i) residual[i] = column[rows_[static_cast<std::size_t>(i)]];
     if (!residual.allFinite()) return false;
     if (jacobian == nullptr) return true;
-    Eigen::MatrixXd slopes(here.size(), static_cast<Eigen::Index>(coordinates_.size()));
-    for (std::size_t j = 0; j < coordinates_.size(); ++j) {
-      const Coordinate& c = coordinates_[j];
-      const auto k = static_cast<Eigen::Index>(j);
-      slope_of(predictor_, model, here, c, x[k] * c.scale, column);
-      slopes.col(k) = column;
-    }
-    weigh(predictor_.data(), weights_, slopes);
+    const Eigen::MatrixXd slopes =
+        slopes_of(predictor_, model, here, weights_, coordinates_,
+                  [&](std::size_t j) { return x[static_cast<Eigen::Index>(j)] * coordinates_[j].scale; });
     *jacobian = slopes(rows_, Eigen::all);
     return true;
   }
@@ -388,15 +399,9 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
     const double value = fit.value(c), margin = c.tolerance ? 1e-3 * (c.upper - c.lower) : 0.0;
     return c.base < 0 && (value < c.lower + margin || value > c.upper - margin);
   };
-  const auto slopes_of = [&](const std::vector<Coordinate>& coordinates) {
-    Eigen::MatrixXd slopes(n, static_cast<Eigen::Index>(coordinates.size()));
-    Eigen::VectorXd column;
-    for (std::size_t j = 0; j < coordinates.size(); ++j) {
-      slope_of(predictor, fit.model, here, coordinates[j], fit.value(coordinates[j]), column);
-      slopes.col(static_cast<Eigen::Index>(j)) = column;
-    }
-    weigh(predictor.data(), weights, slopes);
-    return slopes;
+  const auto slopes = [&](const std::vector<Coordinate>& coordinates) {
+    return slopes_of(predictor, fit.model, here, weights, coordinates,
+                     [&](std::size_t j) { return fit.value(coordinates[j]); });
   };
   std::vector<Coordinate> inside, at_bound;
   for (const Coordinate& c : all) {
@@ -404,7 +409,7 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
     if (is_held(c) && c.tolerance) at_bound.push_back(c);
   }
   if (held != nullptr) {
-    held->slopes = slopes_of(at_bound);
+    held->slopes = slopes(at_bound);
     held->low.resize(held->slopes.cols());
     held->high.resize(held->slopes.cols());
     for (std::size_t j = 0; j < at_bound.size(); ++j) {
@@ -414,7 +419,7 @@ Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const 
     }
   }
   if (used != nullptr) *used = inside;
-  return slopes_of(inside);
+  return slopes(inside);
 }
 
 Eigen::VectorXd change(const Predictor& predictor, const Fit& fit, const Eigen::VectorXd& here,

@@ -254,6 +254,14 @@ double Predictor::pressure_gain(const ModelPoint& model) const noexcept {
                             : model.base[static_cast<std::size_t>(pressure_gain_)] * data_->rig.wheel_radius;
 }
 
+double Predictor::valve_gain(const ModelPoint& model) const noexcept {
+  return gain_ < 0 ? 0.0 : model.base[static_cast<std::size_t>(gain_)];
+}
+
+double Predictor::valve_lag(const ModelPoint& model) const noexcept {
+  return lag_ < 0 ? 0.0 : model.base[static_cast<std::size_t>(lag_)];
+}
+
 void Predictor::predict(const ModelPoint& model, unsigned chains, Eigen::VectorXd& out) const {
   share_work(threads_, data_->runs.size(), [&](std::size_t r) { predict_run(model, r, chains, out); });
 }

@@ -50,12 +50,16 @@ class Predictor {
   [[nodiscard]] const std::vector<BaseParameter>& base() const noexcept { return base_; }
   [[nodiscard]] const Prepared& data() const noexcept { return *data_; }
   [[nodiscard]] std::size_t rows() const noexcept { return data_->rows.size(); }
+  [[nodiscard]] int threads() const noexcept { return threads_; }
   /// Runs whose angle stays within two steps of the encoder.
   [[nodiscard]] const std::vector<std::size_t>& resting_runs() const noexcept { return resting_; }
   /// Torque per radian of the baseline: what an angle within a step is worth.
   [[nodiscard]] double stiffness(const ModelPoint& model) const noexcept;
   /// Torque per pressure difference, N m/Pa, of the baseline.
   [[nodiscard]] double pressure_gain(const ModelPoint& model) const noexcept;
+  /// K_C, and T_C in s.
+  [[nodiscard]] double valve_gain(const ModelPoint& model) const noexcept;
+  [[nodiscard]] double valve_lag(const ModelPoint& model) const noexcept;
   /// What was measured, low-passed: the residual's other half.
   [[nodiscard]] const Eigen::VectorXd& measured() const noexcept { return measured_; }
   /// Predictions of the rows of one run that belong to the chains asked for; other rows of `out` stay as they are.

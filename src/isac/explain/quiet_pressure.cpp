@@ -26,7 +26,7 @@ using Functions = Eigen::Matrix<double, kFunctions, 1>;
 Eigen::MatrixXd solve(const Eigen::MatrixXd& x, const Eigen::MatrixXd& y) {
   const Eigen::VectorXd norm = x.colwise().norm().cwiseMax(1e-12);
   const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd gram = scaled.transpose() * scaled;
+  Eigen::MatrixXd gram = estimate::gram_of(scaled);
   gram.diagonal().array() += 1e-6;
   return norm.cwiseInverse().asDiagonal() * estimate::solve_symmetric_each(gram, scaled.transpose() * y);
 }
@@ -39,7 +39,7 @@ Eigen::VectorXd solve_significant(const Eigen::MatrixXd& x, const Eigen::VectorX
   constexpr double kErrors = 3.5;
   const Eigen::VectorXd norm = x.colwise().norm().cwiseMax(1e-12);
   const Eigen::MatrixXd scaled = x * norm.cwiseInverse().asDiagonal();
-  Eigen::MatrixXd gram = scaled.transpose() * scaled;
+  Eigen::MatrixXd gram = estimate::gram_of(scaled);
   gram.diagonal().array() += 1e-6;
   const Eigen::VectorXd right = scaled.transpose() * y;
   std::vector<Eigen::Index> in(static_cast<std::size_t>(x.cols()));

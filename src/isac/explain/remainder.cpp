@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "isac/explain/any_lag.hpp"
+#include "isac/explain/any_valve.hpp"
 #include "isac/explain/constancy.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/labels.hpp"
@@ -156,12 +156,25 @@ void Search::hold_against_functions(const Around& baseline) {
                     sigma_ahead(behind), behind.separation));
 }
 
-void Search::hold_against_any_lag() {
+void Search::hold_against_any_valve() {
   if (!touches_pressures()) return;
-  const auto behind_it = [&](const Fit& fit) {
+  struct Rival {
+    AnyValve (*fit)(const Around&, int);
+    const char* words;
+  };
+  constexpr Rival kRivals[] = {{any_lag, "a valve unit whose lag has any shape"},
+                               {any_curve, "a valve unit whose rate is any function of its error"}};
+  struct Asked {
+    const char* rival;
+    Comparison behind;
+  };
+  const auto ask = [&](const Fit& fit) {
+    std::vector<Asked> answers;
     const Around beside = around(predictor_, fit, found_.weights);
-    const AnyLag lag = any_lag(beside, options_.threads);
-    return lag.taps > 0 ? std::optional(behind_any_lag(beside, lag)) : std::nullopt;
+    for (const Rival& rival : kRivals)
+      if (const AnyValve any = rival.fit(beside, options_.threads); any.columns > 0)
+        answers.push_back({rival.words, behind_any_valve(beside, any)});
+    return answers;
   };
   // By themselves: pressures know nothing of the others, and a threshold in the torque is a staircase on which a joint fit may stop.
   std::vector<Trial> of_valves;
@@ -169,16 +182,18 @@ void Search::hold_against_any_lag() {
     if ((chains_of(found_.steps[i].trials.front()) & kPressureChains) != 0)
       of_valves.push_back(found_.steps[i].trials.front());
   const bool all = of_valves.size() == found_.added.size();
-  const std::optional<Comparison> behind = behind_it(all ? found_.model : with(of_valves));
-  if (!behind) return;
+  const auto beats = [](const Asked& asked) { return is_beaten(asked.behind); };
+  const std::vector<Asked> named = ask(all ? found_.model : with(of_valves));
+  const auto first = std::find_if(named.begin(), named.end(), beats);
   std::vector<Trial>& trials = found_.steps.front().trials;
   const bool alone = found_.added.size() == 1 && found_.steps.size() == 2;
-  for (std::size_t i = 1; alone && is_beaten(*behind) && i < trials.size(); ++i) {
+  for (std::size_t i = 1; alone && first != named.end() && i < trials.size(); ++i) {
     if (!trials[i].in_set || (chains_of(trials[i]) & kPressureChains) == 0) continue;
     Fit other = with({trials[i]});
-    if (is_beaten(behind_it(other).value_or(*behind))) continue;
-    say(fmt::format("a valve unit whose lag has any shape is {} of {}, not of {}: that takes its place",
-                    sigma_ahead(*behind), ranking_.id_of(trials.front()), ranking_.id_of(trials[i])));
+    const std::vector<Asked> others = ask(other);
+    if (std::any_of(others.begin(), others.end(), beats)) continue;
+    say(fmt::format("{} is {} of {}, not of {}: that takes its place", first->rival,
+                    sigma_ahead(first->behind), ranking_.id_of(trials.front()), ranking_.id_of(trials[i])));
     put_first(i);
     found_.added.front() = trials.front().hypothesis;
     move_to(other);
@@ -186,7 +201,8 @@ void Search::hold_against_any_lag() {
     found_.adequate = !is_open(found_.steps.back());
     return;
   }
-  (void)are_beaten(*behind, "a valve unit whose lag has any shape");
+  for (const Asked& asked : named)
+    if (are_beaten(asked.behind, asked.rival)) return;
 }
 
 void Search::hold_against_itself(const Around& baseline) {

@@ -61,7 +61,7 @@ void Search::hold_against_others() {
   const Around baseline = around(predictor_, found_.baseline, found_.weights);
   hold_against_functions(baseline);
   if (found_.adequate) hold_against_a_step(baseline);
-  if (found_.adequate) hold_against_any_lag();
+  if (found_.adequate) hold_against_any_valve();
   if (found_.adequate) hold_against_itself(baseline);
 }
 
@@ -162,7 +162,13 @@ void Search::forward() {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }
-    if (open && is_within_a_step(step) && leave_half_a_step(true)) {
+    if (const double offset = open ? offset_within_a_step(step) : 0.0;
+        offset != 0 && leave_half_a_step(true)) {
+      found_.doubts.push_back(
+          fmt::format("Beside it the encoder would have to be {:.2f} of its step off, which is {:.2f} of the "
+                      "noise floor: that may be a part of the effect.",
+                      std::abs(offset), step.gate.size));
+      say(found_.doubts.back());
       keep_what_holds_an_offset();
       continue;
     }
@@ -358,11 +364,13 @@ void Search::doubt_the_clock() {
   move_to(found_.model);
 }
 
-bool Search::is_within_a_step(const Step& step) const {
-  return !found_.added.empty() && std::any_of(step.trials.begin(), step.trials.end(), [&](const Trial& t) {
-    return t.in_set && ranking_.id_of(t) == "encoder_offset" &&
-           std::abs(t.values[0]) < 0.5 * data_.rig.angle_step;
-  });
+double Search::offset_within_a_step(const Step& step) const {
+  if (found_.added.empty()) return 0;
+  for (const Trial& t : step.trials)
+    if (t.in_set && ranking_.id_of(t) == "encoder_offset" &&
+        std::abs(t.values[0]) < 0.5 * data_.rig.angle_step)
+      return t.values[0] / data_.rig.angle_step;
+  return 0;
 }
 
 void Search::keep_what_holds_an_offset() {

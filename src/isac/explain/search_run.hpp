@@ -94,8 +94,8 @@ class Search {
   /// A skew within half a sample is tolerated, so that it stands for nothing else; where nothing else is missing and the skew is neither hardly
   /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is.
   void doubt_the_clock();
-  /// Beside an effect, an offset of less than half a step is how the encoder is read.
-  bool is_within_a_step(const Step& step) const;
+  /// Beside an effect, an offset of less than half a step may be how the encoder is read. In steps; 0: none is asked for.
+  double offset_within_a_step(const Step& step) const;
   /// An offset that is left to how the encoder is read may be part of a general case of what was named: a hysteresis that differs by direction is
   /// one that does not and an offset. It stays in the set.
   void keep_what_holds_an_offset();
@@ -141,6 +141,8 @@ class Search {
   /// moves it far (a gain of the encoder for an added inertia) is refitted with it before it is ruled out.
   void fit_with_the_baseline(std::vector<Trial>& trials) const;
   Trial refit_one(const Screened& candidate) const;
+  /// An effect of the valves that is no linear one takes ten times as long as the others.
+  bool is_slow(const Screened& candidate) const;
   std::vector<Trial> refit_all(const std::vector<Screened>& list) const;
   /// Functions without a name show at least this much of the floor, whatever refits say of the effects.
   bool is_open_at_least(const Step& step, double size) const;
@@ -180,8 +182,9 @@ class Search {
   // What casts doubt on a name: remainder.cpp.
   /// Names that functions without one beat are only like the truth, though they leave nothing that a whole search would find.
   void hold_against_functions(const Around& baseline);
-  /// What stands for the valve unit's dynamics may be another lag, with no name; a rival of the name that is such a lag takes its place.
-  void hold_against_any_lag();
+  /// What stands for the valve unit's dynamics may be another lag, or another curve, with no name; a rival of the name that is such a one takes
+  /// its place.
+  void hold_against_any_valve();
   /// Rules the names out where rivals without a name are ahead of them.
   bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of = "");
   /// What moves with the time of the day may have happened at once, between two runs.
@@ -206,9 +209,11 @@ class Search {
   Plausible plausible_;
   Found found_;
   Around place_;  ///< of found_.model
-  std::optional<Trial>
-      first_here_;        ///< what the best of a screen of this place came to when it was refitted, from…
-  Values first_start_{};  ///< …here
+  struct RefittedHere {
+    Values start;
+    Trial trial;
+  };
+  std::vector<RefittedHere> refitted_here_;         ///< the first of a screen of this place
   std::optional<std::set<std::string>> asked_for_;  ///< ids; none: all
   std::optional<Screen> narrow_;                    ///< of this place, that was asked for some ids only
   Responses responses_;

@@ -56,7 +56,7 @@ Eigen::VectorXd Search::beside_functions(const Eigen::VectorXd& rows) const {
 void Search::move_to(const Fit& fit) {
   found_.model = fit;
   place_ = around(predictor_, found_.model, found_.weights);
-  first_here_.reset();
+  refitted_here_.clear();
 }
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
@@ -141,10 +141,16 @@ Screen Search::screen_here() {
   if (s.candidates.empty() || s.candidates.front().gain <= 0) return s;
   const Screened first = s.candidates.front();
   const double before = data_.block_seconds;
-  const std::vector<Trial> best = refit_all({first});
-  first_here_ = best.front();
-  first_start_ = first.start;
-  choose_blocks(best.front().residual);
+  // The next is refitted beside it by who would have nothing to do: it will be asked for if something is missing.
+  std::vector<Screened> asked = {first};
+  if (options_.threads > 1 && s.candidates.size() > 1 && s.candidates[1].gain > 0 && !is_slow(first) &&
+      !is_slow(s.candidates[1]))
+    asked.push_back(s.candidates[1]);
+  const std::vector<Trial> refitted = refit_all(asked);
+  const Trial& best = refitted.front();
+  refitted_here_.clear();
+  for (std::size_t i = 0; i < asked.size(); ++i) refitted_here_.push_back({asked[i].start, refitted[i]});
+  choose_blocks(best.residual);
   if (data_.block_seconds > before) cut_blocks(data_, before);
   const bool large_and_not_found = !is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit;
   if (large_and_not_found && found_.added.empty() && !colour_beside_best_) {
@@ -155,7 +161,7 @@ Screen Search::screen_here() {
   }
   if (large_and_not_found) {
     judge(s, data_, library_, screen_options(),
-          yardstick_beside(s, place_, responses_, first.hypothesis, best.front().residual));
+          yardstick_beside(s, place_, responses_, first.hypothesis, best.residual));
   } else if (data_.block_seconds < before) {
     judge(s, data_, library_, screen_options());
   }
@@ -218,8 +224,8 @@ void Search::choose_moment(Step& step) const {
 }
 
 Trial Search::refit_one(const Screened& candidate) const {
-  if (first_here_ && first_here_->hypothesis == candidate.hypothesis && first_start_ == candidate.start)
-    return *first_here_;
+  for (const RefittedHere& known : refitted_here_)
+    if (known.trial.hypothesis == candidate.hypothesis && known.start == candidate.start) return known.trial;
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(candidate.hypothesis)];
   Refined refined = refine(place_, h, candidate.start);
   // Where the linear start was a bad one, the shape's own values are another.
@@ -236,12 +242,13 @@ Trial Search::refit_one(const Screened& candidate) const {
   return trial;
 }
 
+bool Search::is_slow(const Screened& candidate) const {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(candidate.hypothesis)];
+  return !h.info().linear && (h.chains & kPressureChains) != 0;
+}
+
 std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
-  // An effect of the valves that is no linear one takes ten times as long as the others: a single one has all threads for its runs.
-  const auto is_slow = [&](const Screened& c) {
-    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(c.hypothesis)];
-    return !h.info().linear && (h.chains & kPressureChains) != 0;
-  };
+  // A single slow one has all threads for its runs.
   std::vector<Trial> trials(list.size());
   std::vector<std::size_t> shared, slow;
   for (std::size_t i = 0; i < list.size(); ++i) (is_slow(list[i]) ? slow : shared).push_back(i);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isac/core/units.hpp"
+#include "isac/explain/workers.hpp"
 
 namespace isac::explain {
 namespace {
@@ -179,17 +180,22 @@ void unfilter_some(const Prepared& data, const Weights& weights, const NoiseFilt
 
 /// Calls work.operator()<N>(first column) for groups of four columns, and of one for what is left.
 template <class Work>
-void in_groups(Eigen::Index columns, const Work& work) {
-  Eigen::Index c = 0;
-  for (; c + 4 <= columns; c += 4) work.template operator()<4>(c);
-  for (; c < columns; ++c) work.template operator()<1>(c);
+void in_groups(Eigen::Index columns, int threads, const Work& work) {
+  const Eigen::Index fours = columns / 4;
+  share_work(threads, static_cast<std::size_t>(fours + columns % 4), [&](std::size_t group) {
+    const auto g = static_cast<Eigen::Index>(group);
+    if (g < fours)
+      work.template operator()<4>(4 * g);
+    else
+      work.template operator()<1>(3 * fours + g);
+  });
 }
 
 }  // namespace
 
-void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns) {
+void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns, int threads) {
   const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
-  in_groups(columns.cols(), [&]<int N>(Eigen::Index first) {
+  in_groups(columns.cols(), threads, [&]<int N>(Eigen::Index first) {
     weigh_some<N>(data, weights, filter.get(), columns.middleCols(first, N));
   });
 }
@@ -204,7 +210,7 @@ Eigen::VectorXd unfiltered(const Prepared& data, const Weights& weights, const E
 Eigen::MatrixXd unfiltered_each(const Prepared& data, const Weights& weights, Eigen::MatrixXd weighted) {
   const std::shared_ptr<const NoiseFilter> filter = filter_of(data, weights);
   if (!filter) return weighted;
-  in_groups(weighted.cols(), [&]<int N>(Eigen::Index first) {
+  in_groups(weighted.cols(), 1, [&]<int N>(Eigen::Index first) {
     unfilter_some<N>(data, weights, *filter, weighted.middleCols(first, N));
   });
   return weighted;

@@ -45,7 +45,8 @@ struct Weights {
 };
 
 /// Rows in the chains' units → weighted rows e, each column by itself.
-void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns);
+void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::MatrixXd> columns,
+           int threads = 1);
 /// Rows r/σ of which those of the motion have lost the zero that the torque's rows tell of.
 [[nodiscard]] Eigen::VectorXd without_shared_zero(const Prepared& data, const Weights& weights,
                                                   Eigen::VectorXd rows);
