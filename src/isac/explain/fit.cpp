@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "isac/explain/bounded_fit.hpp"
 #include "isac/explain/workers.hpp"
@@ -325,6 +326,27 @@ unsigned closure(unsigned chains, const ModelPoint& model, bool one_zero) {
   return chains;
 }
 
+/// Calls `work` for each set of chains that hang together, `fit` being of these alone: what shares no parameter is fitted by itself. (A threshold in
+/// the torque is a staircase on which a joint fit stops before the pressures are where they belong.)
+template <class Work>
+void by_themselves(Fit& fit, const Weights& weights, const Work& work) {
+  const unsigned all = fit.chains;
+  const std::vector<Coordinate> coordinates = std::move(fit.coordinates);
+  bool converged = true;
+  for (unsigned left = all, together = 0; left != 0; left &= ~together) {
+    together = closure(left & (~left + 1), fit.model, weights.one_zero) & all;
+    fit.chains = together;
+    fit.coordinates.clear();
+    std::copy_if(coordinates.begin(), coordinates.end(), std::back_inserter(fit.coordinates),
+                 [&](const Coordinate& c) { return (c.chains & together) != 0; });
+    work();
+    converged = converged && fit.converged;
+  }
+  fit.chains = all;
+  fit.coordinates = coordinates;
+  fit.converged = converged;
+}
+
 }  // namespace
 
 double Fit::value(const Coordinate& c) const {
@@ -348,7 +370,7 @@ Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tole
   for (std::size_t i = 0; i < tolerances.size(); ++i)
     fit.coordinates.push_back(effect_coordinate(fit.model.effects[i], static_cast<int>(i), 0, true));
   if (resting_angles) add_rest(predictor, fit.model, kAllChains, fit.coordinates);
-  solve(predictor, fit, weights, 30);
+  by_themselves(fit, weights, [&] { solve(predictor, fit, weights, 30); });
   return fit;
 }
 
@@ -370,15 +392,17 @@ Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active
   add_base(predictor, fit.model, fit.chains, fit.coordinates);
   add_rest(predictor, fit.model, fit.chains, fit.coordinates);
   add_effects(fit.model, fit.tolerances, fit.chains, fit.coordinates);
-  solve(predictor, fit, weights, iterations);
+  by_themselves(fit, weights, [&] { solve(predictor, fit, weights, iterations); });
   return fit;
 }
 
 Fit polished(const Predictor& predictor, Fit fit, const Weights& weights) {
-  Bounded at = coordinates_of(fit);
-  Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
-  polish(rows, at.lower, at.upper, at.x);
-  move_to(predictor, weights, at.x, fit);
+  by_themselves(fit, weights, [&] {
+    Bounded at = coordinates_of(fit);
+    Rows rows(predictor, fit.model, fit.coordinates, weights, fit.chains);
+    polish(rows, at.lower, at.upper, at.x);
+    move_to(predictor, weights, at.x, fit);
+  });
   return fit;
 }
 

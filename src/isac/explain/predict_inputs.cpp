@@ -366,28 +366,33 @@ std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint
   in.swing = in.motions->swing;
   in.pressure[0] = &run.pressure[0];
   in.pressure[1] = &run.pressure[1];
-  if (run.angle.empty()) return shared;
-  for (const Active& a : model.effects) {
-    if (!run.has_pressure) break;
-    const auto& info = a.hypothesis->info();
-    const bool reading = a.hypothesis->reads_pressure;
-    if ((!reading && info.hook != Hook::kMusclePressure) || is_null(a)) continue;
-    for (int i = 0; i < 2; ++i)
+  for (int i = 0; i < 2; ++i) in.first_pressure[i] = run.pressure[i].empty() ? 0.0 : run.pressure[i].front();
+  const auto own = [&] {
+    for (int i = 0; i < 2; ++i) {
       if (in.own_pressure[i].empty()) in.own_pressure[i] = *in.pressure[i];
-    if (reading) {
-      const PressureReading made(a);
-      for (int i = 0; i < 2; ++i)
-        for (double& p : in.own_pressure[i]) p = (p - made.constant[i]) / made.slope[i];
-    } else {
-      for (std::size_t k = 0; k < in.own_pressure[0].size(); ++k) {
-        double p[2] = {in.own_pressure[0][k], in.own_pressure[1][k]};
-        models::effect_muscle_pressure(a.hypothesis->effect, a.values.data(), p);
-        in.own_pressure[0][k] = p[0];
-        in.own_pressure[1][k] = p[1];
-      }
+      in.pressure[i] = &in.own_pressure[i];
     }
-    in.pressure[0] = &in.own_pressure[0];
-    in.pressure[1] = &in.own_pressure[1];
+  };
+  for (const Active& a : model.effects) {
+    if (!run.has_pressure || !a.hypothesis->reads_pressure || is_null(a)) continue;
+    own();
+    const PressureReading made(a);
+    for (int i = 0; i < 2; ++i)
+      for (double& p : in.own_pressure[i]) p = (p - made.constant[i]) / made.slope[i];
+  }
+  if (!in.own_pressure[0].empty())
+    for (int i = 0; i < 2; ++i) in.first_pressure[i] = in.own_pressure[i].front();
+  if (run.angle.empty()) return shared;
+  // What the muscles make force of: no sensor reads it and no valve fills it.
+  for (const Active& a : model.effects) {
+    if (!run.has_pressure || a.hypothesis->info().hook != Hook::kMusclePressure || is_null(a)) continue;
+    own();
+    for (std::size_t k = 0; k < in.own_pressure[0].size(); ++k) {
+      double p[2] = {in.own_pressure[0][k], in.own_pressure[1][k]};
+      models::effect_muscle_pressure(a.hypothesis->effect, a.values.data(), p);
+      in.own_pressure[0][k] = p[0];
+      in.own_pressure[1][k] = p[1];
+    }
   }
   add_columns(index, in);
   return shared;

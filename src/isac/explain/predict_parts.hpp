@@ -107,7 +107,8 @@ struct Predictor::Inputs {
   const Motion* swing = nullptr;
   const std::vector<double>* pressure[2] = {nullptr, nullptr};
   std::vector<double> own_pressure[2];
-  std::vector<double> columns;  ///< row-major: rows of the torque chain × terms
+  double first_pressure[2] = {0, 0};  ///< as the sensors' model has it, before what the muscles make force of
+  std::vector<double> columns;        ///< row-major: rows of the torque chain × terms
   mutable std::vector<double>
       terms;  ///< row-major: samples × terms, each with 1 for its parameter; empty until asked for
 };

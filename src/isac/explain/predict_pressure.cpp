@@ -159,7 +159,7 @@ void Predictor::pressures_of(const ModelPoint& model, const PreparedRun& run, co
   p[0].resize(n);
   p[1].resize(n);
   double state[2];  // what a sensor's model makes of its first reading, at the first reading's best value
-  for (int i = 0; i < 2; ++i) state[i] = run.first_pressure[i] + (*in.pressure[i])[0] - run.pressure[i][0];
+  for (int i = 0; i < 2; ++i) state[i] = run.first_pressure[i] + in.first_pressure[i] - run.pressure[i][0];
   if (!outlets.empty()) {  // the units' own that make these
     const double first[2] = {state[0], state[1]};
     for (int round = 0; round < 8; ++round) {

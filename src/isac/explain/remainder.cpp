@@ -176,14 +176,8 @@ void Search::hold_against_any_valve() {
         answers.push_back({rival.words, behind_any_valve(beside, any)});
     return answers;
   };
-  // By themselves: pressures know nothing of the others, and a threshold in the torque is a staircase on which a joint fit may stop.
-  std::vector<Trial> of_valves;
-  for (std::size_t i = 0; i < found_.added.size(); ++i)
-    if ((chains_of(found_.steps[i].trials.front()) & kPressureChains) != 0)
-      of_valves.push_back(found_.steps[i].trials.front());
-  const bool all = of_valves.size() == found_.added.size();
   const auto beats = [](const Asked& asked) { return is_beaten(asked.behind); };
-  const std::vector<Asked> named = ask(all ? found_.model : with(of_valves));
+  const std::vector<Asked> named = ask(found_.model);
   const auto first = std::find_if(named.begin(), named.end(), beats);
   std::vector<Trial>& trials = found_.steps.front().trials;
   const bool alone = found_.added.size() == 1 && found_.steps.size() == 2;
