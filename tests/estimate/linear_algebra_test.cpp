@@ -35,6 +35,12 @@ TEST(LinearAlgebra, solves_and_inverts_what_it_is_given) {
   EXPECT_FALSE(inverse_square(MatrixXd::Zero(3, 3)).allFinite());
 }
 
+TEST(LinearAlgebra, gram_is_the_product_in_both_halves) {
+  const MatrixXd x = random_matrix(50, 7, 4), gram = gram_of(x);
+  EXPECT_LT((gram - x.transpose() * x).norm(), 1e-13 * gram.norm());
+  EXPECT_EQ(gram, gram.transpose());
+}
+
 TEST(LinearAlgebra, root_is_triangular_whitens_and_says_where_there_is_none) {
   const MatrixXd a = positive_definite(6, 4), b = random_matrix(6, 2, 5);
   const Cholesky root = cholesky(a);

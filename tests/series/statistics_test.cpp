@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -36,6 +37,34 @@ TEST(Statistics, correlation_time_of_a_first_order_process_is_that_of_theory) {
   }
   // 1/2 + Σ a^k = 1/2 + a/(1 − a) = 9.5; 80 000 samples leave about 5 %.
   EXPECT_NEAR(correlation_time(pieces), 9.5, 1.5);
+}
+
+TEST(Statistics, correlation_time_sums_every_lag_of_pieces_of_any_length) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  std::vector<std::vector<double>> pieces;
+  for (const std::size_t length : {0, 1, 2, 7, 9, 40, 400}) {
+    double x = 0;
+    pieces.emplace_back(length);
+    for (double& v : pieces.back()) v = x = 0.8 * x + normal(random) + 3;
+  }
+  // As it is written: a lag after another, until the window is five times what it has found.
+  double mean = 0, count = 0;
+  for (const auto& piece : pieces)
+    for (const double v : piece) mean += v, ++count;
+  mean /= count;
+  const auto covariance = [&](std::size_t lag) {
+    double sum = 0;
+    for (const auto& piece : pieces)
+      for (std::size_t i = lag; i < piece.size(); ++i) sum += (piece[i] - mean) * (piece[i - lag] - mean);
+    return sum;
+  };
+  double tau = 0.5;
+  for (std::size_t lag = 1; lag < 200; ++lag) {
+    tau += covariance(lag) / covariance(0);
+    if (static_cast<double>(lag) >= 5 * std::max(tau, 0.5)) break;
+  }
+  EXPECT_DOUBLE_EQ(correlation_time(pieces), tau);
 }
 
 TEST(Statistics, ljung_box_passes_white_noise_and_refuses_coloured) {

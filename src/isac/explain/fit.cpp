@@ -326,8 +326,8 @@ unsigned closure(unsigned chains, const ModelPoint& model, bool one_zero) {
   return chains;
 }
 
-/// Calls `work` for each set of chains that hang together, `fit` being of these alone: what shares no parameter is fitted by itself. (A threshold in
-/// the torque is a staircase on which a joint fit stops before the pressures are where they belong.)
+/// Calls `work` for each set of chains that hang together, `fit` being of these alone: what shares no parameter is fitted by itself, as far as its own
+/// rows tell.
 template <class Work>
 void by_themselves(Fit& fit, const Weights& weights, const Work& work) {
   const unsigned all = fit.chains;
