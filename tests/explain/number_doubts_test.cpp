@@ -56,6 +56,17 @@ TEST(NumberDoubts, amplitudes_that_are_told_only_together) {
   EXPECT_TRUE(doubts(0.0, 0.03).empty());
 }
 
+TEST(NumberDoubts, an_amplitude_that_no_run_tells_is_not_told_by_the_other) {
+  const models::EffectInfo& gains = info("force_gain_error");
+  const double one = gains.parameters[0].null_value / gains.parameters[0].si_per_unit,
+               none = std::numeric_limits<double>::quiet_NaN();
+  const auto doubts = [&](double first, double error) {
+    return doubts_of_numbers(gains, numbers(gains, {{one + first, error}, {one - 0.05, none}}));
+  };
+  EXPECT_EQ(doubts(0.01, 0.01).size(), 1U);
+  EXPECT_TRUE(doubts(0.03, 0.01).empty()) << "the one with an error is told";
+}
+
 TEST(NumberDoubts, one_amplitude_or_no_error_says_nothing) {
   const models::EffectInfo& friction = info("coulomb_friction");
   EXPECT_TRUE(doubts_of_numbers(friction, numbers(friction, {{0.01, 0.1}})).empty());

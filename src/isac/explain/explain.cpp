@@ -312,6 +312,11 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       for (std::string& why : doubts_of_numbers(
                library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]))
         found.doubts.push_back(std::move(why));
+    if (e.gap.heldout_after > e.gap.heldout_before)
+      found.doubts.push_back(
+          fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "
+                      "the noise's slow part it is nearer.",
+                      e.gap.signal, e.gap.heldout_after, e.gap.unit, e.gap.heldout_before, e.gap.unit));
   }
   if (e.verdict == Verdict::kUnknown) {
     leave_unnamed(predictor, found, e);

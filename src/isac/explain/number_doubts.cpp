@@ -40,15 +40,18 @@ std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
   if (alike)
     doubts.emplace_back("Nothing in it differs by direction beyond its error: it may be something simpler.");
   int amplitudes = 0;
+  bool any_error = false;
   for (int i = 0; i < effect.parameter_count; ++i) {
     const double nothing = effect.parameters[i].null_value;
     const Estimated& e = numbers[static_cast<std::size_t>(i)];
     if (!std::isfinite(nothing)) continue;
-    if (!(std::abs(e.value - nothing / effect.parameters[i].si_per_unit) < kByItself * e.std_error))
-      return doubts;
     ++amplitudes;
+    if (!std::isfinite(e.std_error)) continue;
+    any_error = true;
+    if (std::abs(e.value - nothing / effect.parameters[i].si_per_unit) >= kByItself * e.std_error)
+      return doubts;
   }
-  if (amplitudes > 1)
+  if (any_error && amplitudes > 1)
     doubts.emplace_back(
         "None of its numbers is told by itself, only what they make together: it may be something simpler.");
   return doubts;

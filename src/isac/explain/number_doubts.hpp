@@ -2,8 +2,8 @@
 /// What the numbers of a named effect say against its name: they do not need the effect that they belong to.
 ///
 ///   both ways alike   |x_up − x_down| < 2 √(s_up² + s_down²) of every pair: nothing in them differs by direction
-///   only together     |x − x₀| < 1.645 s of every amplitude, two at least, each with an error of its own: no one of them is told, and what they
-///                     make together something simpler may make as well
+///   only together     |x − x₀| < 1.645 s of every amplitude that has an error of its own, two amplitudes and one such at least: no one of them is
+///                     told, and what they make together something simpler may make as well
 ///
 /// x₀: where an amplitude does nothing (EffectInfo); s: standard errors that hold under coloured noise (uncertainty.hpp).
 /// Units: the parameters'. Threads: pure. Errors: none; a number without an error says nothing.
