@@ -19,6 +19,8 @@ struct Placed {
   Effect effect;
   const double* q;
   double z[models::kMaxEffectStates];
+  // Slope of a state's rate over its step, and what a step makes of it: most states decay by a constant, and what is known already need not be waited for.
+  double slope[models::kMaxEffectStates] = {}, grows[models::kMaxEffectStates] = {};
 };
 
 /// T_C ṗ = K_C u − p and what effects make of it, from the commands as they arrive, by the midpoint rule.
@@ -32,7 +34,8 @@ struct Valves {
 /// Steps over a run; `put(k, state)` takes the pressures at each sample.
 template <class Effects, class Put>
 void follow(const Valves& valves, Effects& effects, double (&state)[2], const Put& put) {
-  constexpr double kNudge = 1.0;  // Pa
+  constexpr double kNudge = 1.0;       // Pa
+  constexpr double kSameSlope = 1e-9;  // relative: differences of rates round as much
   const double rate = 1 / valves.lag, gain = valves.gain;
   models::ValvePoint<double> x;
   x.lag = valves.lag;
@@ -68,7 +71,11 @@ void follow(const Valves& valves, Effects& effects, double (&state)[2], const Pu
       if (j + 1 < up_to_last_state) e.effect.command(e.q, x, e.z, again);
       for (int i = 0; i < count; ++i) {
         const double slope = (g[i] - f[i]) / kNudge * move;
-        e.z[i] += move * f[i] * growth(slope);
+        if (!(std::abs(slope - e.slope[i]) <= kSameSlope * std::abs(slope)) || e.grows[i] == 0) {
+          e.slope[i] = slope;
+          e.grows[i] = growth(slope);
+        }
+        e.z[i] += move * f[i] * e.grows[i];
       }
     }
   };
