@@ -305,6 +305,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     e.trials.push_back({e.effects.front().id, why});
     if (options.progress) options.progress(e.effects.front().id + ": " + why);
   }
+  constexpr double kFurtherOff = 1.01;  // noise decides that much
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);
@@ -312,7 +313,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       for (std::string& why : doubts_of_numbers(
                library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]))
         found.doubts.push_back(std::move(why));
-    if (e.gap.heldout_after > e.gap.heldout_before)
+    if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before)
       found.doubts.push_back(
           fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "
                       "the noise's slow part it is nearer.",

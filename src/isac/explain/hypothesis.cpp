@@ -282,6 +282,11 @@ int Hypothesis::parameters() const noexcept {
   return chosen + static_cast<int>(std::count(free.begin(), free.end(), true));
 }
 
+bool has_fitted_states(const Hypothesis& hypothesis) noexcept {
+  return hypothesis.info().hook == models::Hook::kTorque && hypothesis.info().state_count == 2 &&
+         (hypothesis.chains & bit(Chain::kMotion)) != 0;
+}
+
 Values null_values(const Hypothesis& hypothesis, const Values& shape) {
   Values values = shape;
   const EffectInfo& info = hypothesis.info();

@@ -65,7 +65,12 @@ struct Hypothesis {
 struct Active {
   const Hypothesis* hypothesis = nullptr;
   Values values{};
+  bool as_known_beforehand =
+      false;  ///< without states that the data themselves would have to tell: what is tested owes nothing to its noise
 };
+
+/// Does a prediction of it read states off the data (where what hangs on a compliance stood when a recording began)?
+[[nodiscard]] bool has_fitted_states(const Hypothesis& hypothesis) noexcept;
 
 /// Values at which the effect is absent, shape parameters as given.
 [[nodiscard]] Values null_values(const Hypothesis& hypothesis, const Values& shape);

@@ -171,10 +171,11 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const 
                                .cubic_damping = term(cubic_damping_),
                                .damping = term(damping_)};
     const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
-    if (motion && h.info().state_count == 2 && in.swing != nullptr) {
+    if (motion && has_fitted_states(h) && in.swing != nullptr) {
       add_swing(a, *in.swing, run.interval, sign, sum);
-      add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration,
-               in.swing->from_rest ? kAtRest : kAtStart, sign, sum);
+      if (!a.as_known_beforehand)
+        add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration,
+                 in.swing->from_rest ? kAtRest : kAtStart, sign, sum);
       continue;
     }
     const auto at = [&](std::size_t k) {

@@ -53,6 +53,13 @@ bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo
   return names(a, b.id) || names(b, a.id);
 }
 
+bool is_a_loop_with_an_offset(const std::string& a, const std::string& b) {
+  const auto is_offset = [](const std::string& id) {
+    return id == "torque_offset" || id == "encoder_offset" || nests(id, "torque_offset");
+  };
+  return (a == "hysteresis" && is_offset(b)) || (b == "hysteresis" && is_offset(a));
+}
+
 bool is_beaten(const Comparison& behind) {
   return behind.separation >= kTwinLimit && behind.t >= kBeaten;
 }
@@ -279,6 +286,12 @@ void Search::look_at_limits() {
       const auto info = [&](std::size_t at) -> const models::EffectInfo& {
         return library_.hypotheses[static_cast<std::size_t>(found_.added[at])].info();
       };
+      if (is_a_loop_with_an_offset(library_.hypotheses[static_cast<std::size_t>(found_.added[i])].id(),
+                                   library_.hypotheses[static_cast<std::size_t>(found_.added[k])].id()))
+        found_.doubts.emplace_back(
+            "A hysteresis and an offset are together what a hysteresis that differs by direction is: it may "
+            "be "
+            "that.");
       if (taken_for_one_another(info(i), info(k)))
         found_.doubts.push_back(
             fmt::format("{} and {} are like one another: one effect that is neither may look like both.",

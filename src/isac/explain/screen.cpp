@@ -224,7 +224,7 @@ class Screening {
     Eigen::Index column = 0;
     for (const std::vector<Values>& of_shape : ways)
       for (const Values& way : of_shape) {
-        x.col(column) = change(*place_.predictor, *place_.fit, place_.here, {&h, way});
+        x.col(column) = change(*place_.predictor, *place_.fit, place_.here, {&h, way, true});
         if (!x.col(column).allFinite()) x.col(column).setZero();
         ++column;
       }

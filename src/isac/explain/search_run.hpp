@@ -140,6 +140,8 @@ class Search {
   /// Where a force's reading is clipped, rows of the torque are not linear in the baseline, and off which it was projected holds nearby only: a rival that
   /// moves it far (a gain of the encoder for an added inertia) is refitted with it before it is ruled out.
   void fit_with_the_baseline(std::vector<Trial>& trials) const;
+  /// What it leaves of this place with its amplitude alone told by the data, not the states that its refit read off them.
+  Eigen::VectorXd left_as_known_beforehand(const Trial& t) const;
   Trial refit_one(const Screened& candidate) const;
   /// An effect of the valves that is no linear one takes ten times as long as the others.
   bool is_slow(const Screened& candidate) const;

@@ -135,6 +135,16 @@ Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
                                        likelihood.begin())];
 }
 
+Eigen::VectorXd Search::left_as_known_beforehand(const Trial& t) const {
+  Active a = active_of(t);
+  if (!has_fitted_states(*a.hypothesis)) return t.residual;
+  a.as_known_beforehand = true;
+  const Eigen::VectorXd x = place_.project(response(predictor_, *place_.fit, place_.here, a, found_.weights));
+  const double norm2 = x.squaredNorm();
+  return norm2 > 0 ? Eigen::VectorXd(place_.residual - x * (x.dot(place_.residual) / norm2))
+                   : place_.residual;
+}
+
 Screen Search::screen_here() {
   choose_blocks(place_.residual);
   Screen s = screen(place_, library_, screen_options(), &responses_, narrow_ ? &*narrow_ : nullptr);
@@ -161,7 +171,7 @@ Screen Search::screen_here() {
   }
   if (large_and_not_found) {
     judge(s, data_, library_, screen_options(),
-          yardstick_beside(s, place_, responses_, first.hypothesis, best.residual));
+          yardstick_beside(s, place_, responses_, first.hypothesis, left_as_known_beforehand(best)));
   } else if (data_.block_seconds < before) {
     judge(s, data_, library_, screen_options());
   }
