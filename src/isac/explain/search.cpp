@@ -27,6 +27,12 @@ constexpr double kMostByTolerance =
 constexpr double kHardlyAnything =
     0.01;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
 
+/// Were it right, it would lead the best by half of what lies between them, give or take one sigma.
+bool may_be_right(const Comparison& behind) {
+  constexpr double kOneInAHundred = 2.33;
+  return behind.separation < kTwinLimit || behind.t + 0.5 * behind.separation < kOneInAHundred;
+}
+
 }  // namespace
 
 Found Search::run() {
@@ -303,7 +309,7 @@ bool Search::is_convention(const Step& step) {
     return std::abs(share - convention) < within * convention;
   };
   for (const Trial& t : step.trials) {
-    if (!t.in_set) continue;
+    if (!t.in_set || !may_be_right(t.behind)) continue;
     const std::string id = ranking_.id_of(t);
     const double step_angle = data_.rig.angle_step, interval = data_.runs.front().interval;
     // Once: what lies beyond a tolerance that is there already is an effect, however near.
