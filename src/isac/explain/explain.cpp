@@ -306,6 +306,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     if (options.progress) options.progress(e.effects.front().id + ": " + why);
   }
   constexpr double kFurtherOff = 1.01;  // noise decides that much
+  constexpr double kFew = 25;           // units of noise on the fitted runs, five sigma
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     numbers = uncertainties(predictor, found.model, found.weights);
@@ -313,7 +314,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       for (std::string& why : doubts_of_numbers(
                library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]))
         found.doubts.push_back(std::move(why));
-    if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before)
+    if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before && found.steps.front().units < kFew)
       found.doubts.push_back(
           fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "
                       "the noise's slow part it is nearer.",
