@@ -16,12 +16,7 @@ namespace isac::explain {
 namespace {
 
 std::vector<PlannedRun> day_of(double seconds) {
-  const PlannedRun steps{.experiment = "pcu-step",
-                         .seconds = 12,
-                         .mean_pressure_kgcm2 = 3,
-                         .pressure_swing_kgcm2 = 1.2,
-                         .pressure_period_s = 4,
-                         .waveform = "steps"};
+  const PlannedRun steps = test::valve_steps(12, 3);
   PlannedRun low = test::by_hand(seconds, 0.4, 1.2);
   low.mean_pressure_kgcm2 = 2.2;
   PlannedRun high = low;

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <utility>
+
 #include "isac/core/units.hpp"
 #include "prepared_day.hpp"
 
@@ -12,12 +15,7 @@ namespace {
 constexpr double kThreshold = 0.3 * kPascalPerKgfCm2, kDeadTime = 0.008;
 
 std::vector<PlannedRun> day() {
-  const PlannedRun steps{.experiment = "pcu-step",
-                         .seconds = 24,
-                         .mean_pressure_kgcm2 = 1.5,
-                         .pressure_swing_kgcm2 = 1.2,
-                         .pressure_period_s = 4,
-                         .waveform = "steps"};
+  const PlannedRun steps = test::valve_steps(24, 1.5);
   return {test::by_hand(16, 0.4, 0.5), test::clamped(16, 0.1, 1.2, 6), steps,
           test::free_in_steps(16, 4, 0.8)};
 }
@@ -49,6 +47,29 @@ TEST(Refit, fits_the_pressures_as_if_the_torque_had_no_effect_of_its_own) {
   EXPECT_NEAR(delay_beside, kDeadTime, 2e-4);
   EXPECT_EQ(both.coordinates.size(), alone.coordinates.size() + day.with({threshold}).coordinates.size());
   EXPECT_DOUBLE_EQ(both.loss, both.residual.squaredNorm());
+}
+
+TEST(Response, as_known_beforehand_owes_nothing_to_the_torque_that_was_read) {
+  test::PreparedDay day{
+      test::TiedRig{}, {test::by_hand(16, 0.4, 0.5), test::free_in_steps(16, 4, 0.8)}, 4.0, 0};
+  const Hypothesis& ring = day.hypothesis("series_elasticity_within");
+  const Eigen::VectorXd here = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(day.data.rows.size()));
+  const auto responses = [&] {
+    Active a;
+    a.hypothesis = &ring;
+    a.values = {1e-3, 9, 0.05};
+    const Eigen::VectorXd fitted = change(day.predictor, day.baseline, here, a);
+    a.as_known_beforehand = true;
+    return std::pair(fitted, change(day.predictor, day.baseline, here, a));
+  };
+  const auto [fitted, known] = responses();
+  for (PreparedRun& run : day.data.runs)
+    for (std::size_t k = 0; k < run.smooth_torque.size(); ++k)
+      run.smooth_torque[k] += 0.01 * std::sin(6.283185307179586 * 9 * run.interval * static_cast<double>(k));
+  const auto [fitted_again, known_again] = responses();
+  EXPECT_GT(known.norm(), 0);
+  EXPECT_EQ(known_again, known);
+  EXPECT_GT((fitted_again - fitted).norm(), 1e-3 * known.norm());
 }
 
 TEST(Predictor, fills_a_muscle_whatever_it_makes_force_of) {

@@ -16,12 +16,7 @@ namespace isac::explain {
 namespace {
 
 std::vector<PlannedRun> day() {
-  const PlannedRun steps{.experiment = "pcu-step",
-                         .seconds = 24,
-                         .mean_pressure_kgcm2 = 3,
-                         .pressure_swing_kgcm2 = 1.2,
-                         .pressure_period_s = 4,
-                         .waveform = "steps"};
+  const PlannedRun steps = test::valve_steps(24, 3);
   return {test::by_hand(16, 0.4, 0.5),
           test::by_hand(14, 0.4, 3.0),
           test::clamped(16, 0.1, 1.2, 6),

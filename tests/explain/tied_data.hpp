@@ -229,6 +229,16 @@ inline explain::PlannedRun by_hand(double seconds, double amplitude, double spee
           .waveform = "hold"};
 }
 
+/// Both valves step about their mean.
+inline explain::PlannedRun valve_steps(double seconds, double mean) {
+  return {.experiment = "pcu-step",
+          .seconds = seconds,
+          .mean_pressure_kgcm2 = mean,
+          .pressure_swing_kgcm2 = 1.2,
+          .pressure_period_s = 4,
+          .waveform = "steps"};
+}
+
 inline explain::PlannedRun clamped(double seconds, double angle, double swing, double period,
                                    const char* waveform = "triangle") {
   return {.experiment = "constant-angle",

@@ -86,6 +86,7 @@ bool Search::no_zero_wanders_beside_it() {
   colour_beside_best_ = true;
   found_.added.clear();
   found_.steps.clear();
+  found_.doubts.clear();  // of what was added
   first_size_ = largest_size_ = largest_units_ = 0;
   take_colour(rows);
   return true;
