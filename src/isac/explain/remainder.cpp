@@ -175,23 +175,22 @@ void Search::hold_against_any_valve() {
     const char* rival;
     Comparison behind;
   };
-  const auto ask = [&](const Fit& fit) {
+  const auto ask = [&](const Around& beside) {
     std::vector<Asked> answers;
-    const Around beside = around(predictor_, fit, found_.weights);
     for (const Rival& rival : kRivals)
       if (const AnyValve any = rival.fit(beside, options_.threads); any.columns > 0)
         answers.push_back({rival.words, behind_any_valve(beside, any)});
     return answers;
   };
   const auto beats = [](const Asked& asked) { return is_beaten(asked.behind); };
-  const std::vector<Asked> named = ask(found_.model);
+  const std::vector<Asked> named = ask(place_);
   const auto first = std::find_if(named.begin(), named.end(), beats);
   std::vector<Trial>& trials = found_.steps.front().trials;
   const bool alone = found_.added.size() == 1 && found_.steps.size() == 2;
   for (std::size_t i = 1; alone && first != named.end() && i < trials.size(); ++i) {
     if (!trials[i].in_set || (chains_of(trials[i]) & kPressureChains) == 0) continue;
     Fit other = with({trials[i]});
-    const std::vector<Asked> others = ask(other);
+    const std::vector<Asked> others = ask(around(predictor_, other, found_.weights));
     if (std::any_of(others.begin(), others.end(), beats)) continue;
     say(fmt::format("{} is {} of {}, not of {}: that takes its place", first->rival,
                     sigma_ahead(first->behind), ranking_.id_of(trials.front()), ranking_.id_of(trials[i])));
