@@ -53,6 +53,22 @@ struct Setting {
   }
 };
 
+/// A dozen functions of the signals, in noise that scatters the same in every block.
+std::vector<Column> functions_that_scatter(double scatter, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::vector<Column> columns(12);
+  for (Column& c : columns) {
+    c.atom_score = c.atom_norm = Eigen::VectorXd::Zero(kBlocks);
+    for (Eigen::Index b = 0; b < c.atom_norm.size(); ++b) {
+      c.atom_norm[b] = 1;
+      c.atom_score[b] = scatter * normal(random);
+    }
+    c.norm2 = c.chain_norm2[0] = kBlocks;
+    c.score = c.atom_score.sum();
+  }
+  return columns;
+}
+
 TEST(Judge, few_blocks_give_a_small_p_to_noise_no_more_often_than_it_says) {
   const Setting setting;
   std::mt19937_64 random(5);
@@ -96,6 +112,48 @@ double p_of_two(const Setting& setting, double sigma, std::mt19937_64& random) {
   before += sigma * (x.col(0) / x.col(0).norm() - x.col(1) / x.col(1).norm());
   const Eigen::VectorXd after = before - x * estimate::least_squares(x, before);
   return p_of_refit(setting.data, before, after);
+}
+
+/// Of an effect that five blocks carry, whose noise is `loud` times as large there as elsewhere.
+double p_of_five(const Setting& setting, double sigma, double loud, std::mt19937_64& random) {
+  constexpr Eigen::Index kFive = 5;
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.7, 1.4);
+  Eigen::VectorXd before(static_cast<Eigen::Index>(kBlocks)), x = Eigen::VectorXd::Zero(before.size());
+  for (Eigen::Index b = 0; b < before.size(); ++b) {
+    const bool carries = b % 10 == 0 && b < 10 * kFive;
+    before[b] = (carries ? loud : 1.0) * normal(random);
+    if (carries) x[b] = uniform(random);
+  }
+  before += sigma / x.norm() * x;
+  const Eigen::VectorXd after = before - x * (x.dot(before) / x.squaredNorm());
+  return p_in_its_blocks(setting.data, before, after, {}, {.unit = 1, .blocks = 150});
+}
+
+TEST(PValueInItsBlocks, is_small_no_more_often_than_it_says_where_the_noise_is_far_louder) {
+  const Setting setting;
+  std::mt19937_64 random(8);
+  constexpr int kDraws = 2000;
+  const auto share_below = [&](double p, double loud) {
+    int below = 0;
+    for (int i = 0; i < kDraws; ++i) below += p_of_five(setting, 0, loud, random) <= p ? 1 : 0;
+    return static_cast<double>(below) / kDraws;
+  };
+  EXPECT_LE(share_below(0.01, 1), 0.017);
+  EXPECT_GE(share_below(0.05, 1), 0.015);  // a test that never rejects would say nothing
+  EXPECT_LE(share_below(0.01, 10), 0.017);
+  // So little louder that chance hides it one time in seven: by the variance elsewhere alone it is one in five.
+  EXPECT_LE(share_below(0.01, 2), 0.04);
+  EXPECT_GE(share_below(0.01, 2), 0.005);
+}
+
+TEST(PValueInItsBlocks, is_small_where_few_blocks_agree) {
+  const Setting setting;
+  std::mt19937_64 random(9);
+  int small = 0;
+  for (int i = 0; i < 200; ++i) small += p_of_five(setting, 12, 1, random) < 1e-4 ? 1 : 0;
+  EXPECT_GE(small, 170);
+  for (int i = 0; i < 50; ++i) EXPECT_LT(p_of_five(setting, 100, 1, random), 1e-5);
 }
 
 TEST(PValueOfARefit, is_small_where_two_amplitudes_are_large_in_few_blocks) {
@@ -258,20 +316,7 @@ TEST(Around, leaves_beside_a_response_what_least_squares_within_the_tolerances_l
 TEST(Judge, measures_a_large_rare_effect_by_what_its_refit_leaves_elsewhere) {
   const Setting setting;
   std::mt19937_64 random(7);
-  std::normal_distribution<double> normal;
-  const auto functions = [&](double scatter) {
-    std::vector<Column> columns(12);
-    for (Column& c : columns) {
-      c.atom_score = c.atom_norm = Eigen::VectorXd::Zero(kBlocks);
-      for (Eigen::Index b = 0; b < c.atom_norm.size(); ++b) {
-        c.atom_norm[b] = 1;
-        c.atom_score[b] = scatter * normal(random);
-      }
-      c.norm2 = c.chain_norm2[0] = kBlocks;
-      c.score = c.atom_score.sum();
-    }
-    return columns;
-  };
+  const auto functions = [&](double scatter) { return functions_that_scatter(scatter, random); };
   Column stop;  // thirty sigma of white noise in one block
   stop.hypothesis = 0;
   stop.atom_score = stop.atom_norm = Eigen::VectorXd::Zero(kBlocks);

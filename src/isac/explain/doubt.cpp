@@ -59,7 +59,7 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
                 Chain chain, const ExplainOptions& options, Gap& gap) {
   constexpr double kClearly = 3.0, kHardly = -1.645;    // sigma, freed of what the noise remembers
   constexpr double kAbout = 1.01;                       // where they hardly show the effect, noise decides
-  constexpr double kLikely = 1.645, kWandersBy = 1.05;  // and a zero that wanders decides by more
+  constexpr double kLikely = 1.645, kWandersBy = 1.05;  // by more it casts a doubt
   constexpr double kTooLittle = 8, kHardlyWorse = 1.02;
   if (found.added.empty() || proof.runs() == 0) return false;
   const bool worse = does_worse(found, proof, chain, gap);
@@ -82,13 +82,18 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
   const bool says_nothing = freed.behind.separation < kTooLittle && freed.behind.t > 0 &&
                             freed.behind.t < kLikely &&
                             gap.heldout_after <= kHardlyWorse * gap.heldout_before;
-  if (slow && freed.first < freed.second &&
-      (says_nothing || (gap.heldout_after <= kWandersBy * gap.heldout_before && freed.behind.t >= kLikely))) {
+  const bool likely = freed.behind.t >= kLikely;
+  if (slow && freed.first < freed.second && (says_nothing || likely)) {
     if (says_nothing)
       found.doubts.push_back(
           fmt::format("The held-out runs neither show nor refute it ({:.1f} sigma for it, freed of the "
                       "noise's slow part).",
                       freed.behind.t));
+    else if (gap.heldout_after > kWandersBy * gap.heldout_before)
+      found.doubts.push_back(
+          fmt::format("The held-out runs, as they were read, are {:.3g} {} off with it and {:.3g} without; "
+                      "freed of the noise's slow part they speak for it, by {:.1f} sigma.",
+                      gap.heldout_after, gap.unit, gap.heldout_before, freed.behind.t));
     free_of_slow_noise(predictor.data(), found, freed, chain, gap);
     return false;
   }

@@ -136,7 +136,7 @@ void fill_gap(const Predictor& predictor, const Found& found, const ModelPoint& 
 bool other_reading_shows(const Predictor& predictor, const Library& library, const Found& found,
                          const ModelPoint& plain, const Proof& proof, Chain chain, bool refuted,
                          const ExplainOptions& options, Gap& gap) {
-  constexpr double kByLittle = 1.05;
+  constexpr double kByLittle = 1.05, kShows = 0.999;
   if (chain != Chain::kTorque && chain != Chain::kMotion) return false;
   const Chain other = chain == Chain::kTorque ? Chain::kMotion : Chain::kTorque;
   const Colour& colour = found.weights.colour[static_cast<int>(chain)];
@@ -149,7 +149,8 @@ bool other_reading_shows(const Predictor& predictor, const Library& library, con
     return false;
   Gap there;
   fill_gap(predictor, found, plain, proof, other, options.baseline, there);
-  if (!(there.heldout_after < there.heldout_before) || (refuted && closes_little(there))) return false;
+  if (!(there.heldout_after < kShows * there.heldout_before) || (refuted && closes_little(there)))
+    return false;
   gap = there;
   return true;
 }

@@ -46,6 +46,11 @@ double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, d
   return scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / scatter, of.carried_by - 1) : 1.0;
 }
 
+/// Degrees of freedom of a variance that is F > 1 times one told by many, the rest told by few (Satterthwaite): F²/(1/ν + (F − 1)²/ν_few).
+double freedom_of_both(double F, double many, double few) {
+  return F * F / (1 / std::max(1.0, many) + (F - 1) * (F - 1) / std::max(1.0, few));
+}
+
 /// p-value of a score of which whole runs scatter more than their blocks do:
 ///
 ///   W = Σ_b l_b²/(1 − h_b)²,  R the same of whole runs,  F = R/W > 1:
@@ -60,18 +65,16 @@ std::optional<double> p_by_runs(double score, const Eigen::VectorXd& left, const
   const Jackknife blocks = jackknife(left, norm2), whole = jackknife(run_left, run_norm2);
   if (!(whole.scatter > blocks.scatter) || !(blocks.scatter > 0)) return std::nullopt;
   const double F = whole.scatter * whole.scatter / (blocks.scatter * blocks.scatter);
-  const double of_blocks = std::max(1.0, blocks.carried_by - 1),
-               of_runs = std::max(1.0, whole.carried_by - 1);
-  const double freedom = F * F / (1 / of_blocks + (F - 1) * (F - 1) / of_runs);
-  return series::student_t_two_sided(std::abs(score) / whole.scatter, freedom);
+  return series::student_t_two_sided(std::abs(score) / whole.scatter,
+                                     freedom_of_both(F, blocks.carried_by - 1, whole.carried_by - 1));
 }
 
 /// What scores of any function of the signals scatter, chain by chain, in blocks that a column does not live in.
-class Elsewhere {
+class ScatterElsewhere {
  public:
-  Elsewhere(const std::vector<Column>& columns,
-            const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& joined,
-            std::vector<std::vector<char>> there)
+  ScatterElsewhere(const std::vector<Column>& columns,
+                   const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& joined,
+                   std::vector<std::vector<char>> there)
       : there_(std::move(there)) {
     for (const Column& c : columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
@@ -81,12 +84,8 @@ class Elsewhere {
     }
   }
 
-  struct Scatter {
-    double largest =
-        0;  ///< variance per unit of norm beyond the column's own blocks; 0 where too little is left to tell
-    int blocks = 0;  ///< that it was measured in
-  };
-  Scatter scatter(int chain, const Eigen::VectorXd& own_norm2) const {
+  /// The largest of the functions; 0 where too little is left to tell.
+  Elsewhere scatter(int chain, const Eigen::VectorXd& own_norm2) const {
     std::vector<Eigen::Index> order(static_cast<std::size_t>(own_norm2.size()));
     std::iota(order.begin(), order.end(), Eigen::Index{0});
     std::sort(order.begin(), order.end(),
@@ -99,7 +98,7 @@ class Elsewhere {
       held += own_norm2[b];
       own[static_cast<std::size_t>(b)] = 1;
     }
-    Scatter found;
+    Elsewhere found;
     const Functions& f = chains_[chain];
     for (std::size_t k = 0; k < f.score2.size(); ++k) {
       double score2 = 0, norm2 = 0;
@@ -115,7 +114,7 @@ class Elsewhere {
       if (blocks < kBlocksElsewhere || norm2 <= 0.05 * f.norm2[k].sum()) continue;
       // The largest of many alike is too large by what chance makes of their maximum.
       const double scatter = score2 / norm2 / (1 + kMostByChance * std::sqrt(2.0 / blocks));
-      if (scatter > found.largest) found = {scatter, blocks};
+      if (scatter > found.unit) found = {scatter, blocks};
     }
     return found;
   }
@@ -207,30 +206,61 @@ Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses&
   return yardstick;
 }
 
-double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
-                  const Eigen::VectorXd& error_of_means) {
+namespace {
+
+/// What a refit closed, before − after, block by block.
+struct Closed {
+  Eigen::VectorXd left, norm2;  ///< Σ after·closed, Σ closed²
+  double score = 0, run_error2 = 0;
+  std::vector<Eigen::Index> run_of_block;
+  Jackknife own;
+};
+
+std::optional<Closed> closed_by(const Prepared& data, const Eigen::VectorXd& before,
+                                const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means) {
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
-  Eigen::VectorXd left = Eigen::VectorXd::Zero(blocks), norm2 = Eigen::VectorXd::Zero(blocks);
-  std::vector<Eigen::Index> run_of_block(data.blocks, 0);
+  Closed c;
+  c.left = c.norm2 = Eigen::VectorXd::Zero(blocks);
+  c.run_of_block.assign(data.blocks, 0);
   Eigen::VectorXd run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.runs.size()));
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i), block = static_cast<Eigen::Index>(data.rows[i].block);
     const double closed = before[row] - after[row];
-    norm2[block] += closed * closed;
-    left[block] += after[row] * closed;
-    run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
+    c.norm2[block] += closed * closed;
+    c.left[block] += after[row] * closed;
+    c.run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
     if (error_of_means.size() > 0)
       run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * error_of_means[row];
   }
-  if (!(norm2.sum() > 0)) return 1;
-  const double score = norm2.sum() + left.sum();
-  const Jackknife of = jackknife(left, norm2);
-  if (!(of.carried_by > 2) || !(of.scatter > 0)) return 1;
-  const double scatter = std::hypot(of.scatter, run_error.norm());
-  const double p = series::student_t_two_sided(std::abs(score) / scatter, of.carried_by - 1);
+  if (!(c.norm2.sum() > 0)) return std::nullopt;
+  c.score = c.norm2.sum() + c.left.sum();
+  c.run_error2 = run_error.squaredNorm();
+  c.own = jackknife(c.left, c.norm2);
+  return c;
+}
+
+}  // namespace
+
+double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
+                  const Eigen::VectorXd& error_of_means) {
+  const std::optional<Closed> c = closed_by(data, before, after, error_of_means);
+  if (!c || !(c->own.carried_by > 2) || !(c->own.scatter > 0)) return 1;
+  const double scatter = std::sqrt(c->own.scatter * c->own.scatter + c->run_error2);
+  const double p = series::student_t_two_sided(std::abs(c->score) / scatter, c->own.carried_by - 1);
   return std::max(
-      p,
-      p_by_runs(score, left, norm2, run_of_block, static_cast<Eigen::Index>(data.runs.size())).value_or(0));
+      p, p_by_runs(c->score, c->left, c->norm2, c->run_of_block, static_cast<Eigen::Index>(data.runs.size()))
+             .value_or(0));
+}
+
+double p_in_its_blocks(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
+                       const Eigen::VectorXd& error_of_means, const Elsewhere& elsewhere) {
+  const std::optional<Closed> c = closed_by(data, before, after, error_of_means);
+  if (!c || !(elsewhere.unit > 0)) return 1;
+  const double variance = elsewhere.unit * c->norm2.sum(), F = c->own.scatter * c->own.scatter / variance;
+  const bool louder = c->own.carried_by > 2 && F > 1;
+  return series::student_t_two_sided(
+      std::abs(c->score) / std::sqrt((louder ? F : 1.0) * variance + c->run_error2),
+      louder ? freedom_of_both(F, elsewhere.blocks, c->own.carried_by - 1) : elsewhere.blocks);
 }
 
 double joint_p(double flips, double rare, double level) noexcept {
@@ -276,6 +306,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
   for (Column& c : result.columns) {
     c.T = 0;
     c.rare_p = 1;
+    c.elsewhere = {};
     if (c.norm2 <= 0) continue;
     const double scatter2 = joined(c.atom_score).squaredNorm() + c.run_error.squaredNorm();
     c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
@@ -290,7 +321,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
   Eigen::MatrixXd scores =
       Eigen::MatrixXd::Zero(blocks + runs, static_cast<Eigen::Index>(result.columns.size()));
   double rare_columns = 0;
-  const Elsewhere elsewhere(result.columns, joined, seen), beside(yardstick.functions, joined, seen);
+  const ScatterElsewhere elsewhere(result.columns, joined, seen), beside(yardstick.functions, joined, seen);
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
     const Eigen::VectorXd score = joined(c.atom_score);
@@ -302,22 +333,25 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     if (c.norm2 <= 0 || c.hypothesis < 0 || c.carried_by >= kBoundingBlocks) continue;
     const Eigen::VectorXd own = joined(c.atom_norm);
     if (c.carried_by < std::min(kFewBlocks, kShareOfBlocks * most)) {
-      double unit = 1;
-      int seen_in = static_cast<int>(blocks);
+      c.elsewhere = {1, static_cast<int>(blocks)};
       for (int chain = 0; chain < kChains; ++chain) {
         if (c.chain_norm2[chain] <= 1e-3 * c.norm2) continue;
-        const Elsewhere::Scatter there =
+        const Elsewhere there =
             (c.hypothesis == yardstick.hypothesis ? beside : elsewhere).scatter(chain, own);
-        unit = std::max(unit, there.blocks > 0 ? there.largest : std::numeric_limits<double>::infinity());
-        seen_in = std::min(seen_in, there.blocks);
+        c.elsewhere.unit = std::max(c.elsewhere.unit,
+                                    there.blocks > 0 ? there.unit : std::numeric_limits<double>::infinity());
+        c.elsewhere.blocks = std::min(c.elsewhere.blocks, there.blocks);
       }
-      if (std::isfinite(unit))
+      if (std::isfinite(c.elsewhere.unit))
         c.rare_p = series::student_t_two_sided(
-            std::abs(c.score) / std::sqrt(unit * c.norm2 + c.run_error.squaredNorm()), seen_in);
+            std::abs(c.score) / std::sqrt(c.elsewhere.unit * c.norm2 + c.run_error.squaredNorm()),
+            c.elsewhere.blocks);
     } else {
       c.rare_p = jackknife_p(score, own, c.run_error.squaredNorm());
     }
     c.rare_p = std::max(c.rare_p, told_by_runs(c).value_or(0));
+    if (const auto least = yardstick.least_p.find(c.hypothesis); least != yardstick.least_p.end())
+      c.rare_p = std::max(c.rare_p, least->second);
     if (c.hypothesis == yardstick.hypothesis) c.rare_p = std::min(c.rare_p, yardstick.own_p);
     ++rare_columns;
   }

@@ -24,6 +24,7 @@ constexpr double kOwnError =
 constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
 constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
+constexpr double kLittle = 0.05;  // of the units that an effect closed: a doubt of its name, and no more
 constexpr double kHardlyAnything =
     0.01;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
 
@@ -195,7 +196,7 @@ void Search::forward() {
     if (open && !take && found_.added.size() == 1 &&
         (a_rival_goes_better_with(step) || another_pair_closes_more(step)))
       continue;
-    if (open && !take && !found_.added.empty()) leave_elsewhere(step);
+    if (open && !take && !found_.added.empty() && !leave_elsewhere(step)) leave_a_little(step);
     found_.steps.push_back(std::move(step));
     if (take) {
       const Trial& best = found_.steps.back().trials.front();
@@ -261,13 +262,26 @@ void Search::take_settled() {
   move_to(refit(predictor_, found_.baseline, effects, found_.weights, 6));
 }
 
-void Search::leave_elsewhere(const Step& step) {
-  if (leaves_over_in(bit(step.gate.chain)) || step.gate.size >= kSecondOfFloor) return;
+bool Search::leave_elsewhere(const Step& step) {
+  if (leaves_over_in(bit(step.gate.chain)) || step.gate.size >= kSecondOfFloor) return false;
   found_.adequate = left_elsewhere_ = true;
   found_.doubts.push_back(fmt::format(
       "Something more is missing in other readings, {:.2f} of the noise floor of the {} (p = {:.1g}), "
       "and too little to be named.",
       step.gate.size, label_of(data_, step.gate.chain).signal, step.gate.p_value));
+  say(found_.doubts.back());
+  return true;
+}
+
+void Search::leave_a_little(const Step& step) {
+  if (step.units >= std::min(kLargeForSure, kLittle * largest_units_) ||
+      step.gate.size >= kSecondOfFirst * first_size_)
+    return;
+  found_.adequate = true;
+  found_.doubts.push_back(
+      fmt::format("Beside it a little more is missing, {:.2f} of the noise floor of the {} (p = {:.1g}): its "
+                  "equation is not all, or another is nearer.",
+                  step.gate.size, label_of(data_, step.gate.chain).signal, step.gate.p_value));
   say(found_.doubts.back());
 }
 

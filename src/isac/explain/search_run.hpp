@@ -85,7 +85,9 @@ class Search {
     return library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains;
   }
   /// What is left in rows that have nothing to do with those of the name, too little to be named, casts a doubt and takes no name away.
-  void leave_elsewhere(const Step& step);
+  bool leave_elsewhere(const Step& step);
+  /// Nor does what is left in the same rows where it is hardly anything beside what the name closed, less than five sigma.
+  void leave_a_little(const Step& step);
   /// Of an effect that a tolerance took its share of, with that share.
   double whole_size(const Trial& t) const;
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
@@ -125,6 +127,9 @@ class Search {
   /// Blocks must be longer than the noise remembers, not than a missing effect does: their length is taken from what the best
   /// candidate leaves over. So is the yardstick of one that few blocks carry.
   Screen screen_here();
+  /// What is significant in hardly any blocks only is refitted, and the noise that this leaves in these very blocks counts where it is louder
+  /// there than elsewhere.
+  void hold_rare_against_their_blocks(Screen& s, Yardstick yardstick);
   /// What the candidate leaves (r/σ) beside which the noise is likeliest, among those that are large for sure: what is slow and missing passes
   /// for slow noise until it is taken out.
   Eigen::VectorXd least_noise_beside(const Screen& s) const;

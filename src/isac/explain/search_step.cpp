@@ -163,6 +163,7 @@ Screen Search::screen_here() {
   for (std::size_t i = 0; i < asked.size(); ++i) refitted_here_.push_back({asked[i].start, refitted[i]});
   choose_blocks(best.residual);
   if (data_.block_seconds > before) cut_blocks(data_, before);
+  Yardstick yardstick;
   const bool large_and_not_found = !is_significant(first, s) && first.gain > kLargeForSure * s.noise_unit;
   if (large_and_not_found && found_.added.empty() && !colour_beside_best_) {
     // Too little is left of it in the other blocks, or the noise was taken for as slow as the effect is.
@@ -171,12 +172,40 @@ Screen Search::screen_here() {
     return found_.wants_torque_of_free_runs ? s : screen_here();
   }
   if (large_and_not_found) {
-    judge(s, data_, library_, screen_options(),
-          yardstick_beside(s, place_, responses_, first.hypothesis, left_as_known_beforehand(best)));
+    yardstick = yardstick_beside(s, place_, responses_, first.hypothesis, left_as_known_beforehand(best));
+    judge(s, data_, library_, screen_options(), yardstick);
   } else if (data_.block_seconds < before) {
     judge(s, data_, library_, screen_options());
   }
+  hold_rare_against_their_blocks(s, std::move(yardstick));
   return s;
+}
+
+void Search::hold_rare_against_their_blocks(Screen& s, Yardstick yardstick) {
+  std::vector<Screened> rare;
+  std::vector<Elsewhere> elsewhere;
+  for (const Screened& c : s.candidates) {
+    if (!is_significant(c, s) || c.T >= s.limit) continue;
+    const Column* rarest = nullptr;
+    for (const Column& column : s.columns)
+      if (column.hypothesis == c.hypothesis && (rarest == nullptr || column.rare_p < rarest->rare_p))
+        rarest = &column;
+    if (rarest == nullptr || !(rarest->elsewhere.unit > 0)) continue;
+    rare.push_back(c);
+    elsewhere.push_back(rarest->elsewhere);
+  }
+  if (rare.empty()) return;
+  const std::vector<Trial> trials = refit_all(rare);
+  const Eigen::VectorXd means = error_of_means(place_);
+  for (std::size_t i = 0; i < rare.size(); ++i) {
+    yardstick.least_p[rare[i].hypothesis] =
+        p_in_its_blocks(data_, place_.residual, left_as_known_beforehand(trials[i]), means, elsewhere[i]);
+    const bool known = std::any_of(refitted_here_.begin(), refitted_here_.end(), [&](const RefittedHere& r) {
+      return r.trial.hypothesis == rare[i].hypothesis && r.start == rare[i].start;
+    });
+    if (!known) refitted_here_.push_back({rare[i].start, trials[i]});
+  }
+  judge(s, data_, library_, screen_options(), yardstick);
 }
 
 std::vector<Screened> Search::shortlist(const Screen& s) const {
