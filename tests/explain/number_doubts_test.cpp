@@ -67,6 +67,16 @@ TEST(NumberDoubts, an_amplitude_that_no_run_tells_is_not_told_by_the_other) {
   EXPECT_TRUE(doubts(0.03, 0.01).empty()) << "the one with an error is told";
 }
 
+TEST(NumberDoubts, friction_that_does_not_fall_from_rest_is_something_simpler) {
+  const models::EffectInfo& stribeck = info("stribeck_friction");
+  const auto doubts = [&](double sliding) {
+    return doubts_of_numbers(stribeck, numbers(stribeck, {{sliding, 0.0019}, {0.0109, 0.0003}, {0.6, 0.1}}));
+  };
+  ASSERT_EQ(doubts(0.0079).size(), 1U);
+  EXPECT_NE(doubts(0.0079).front().find("rest"), std::string::npos);
+  EXPECT_TRUE(doubts(0.0065).empty()) << "2.3 standard errors apart";
+}
+
 TEST(NumberDoubts, one_amplitude_or_no_error_says_nothing) {
   const models::EffectInfo& friction = info("coulomb_friction");
   EXPECT_TRUE(doubts_of_numbers(friction, numbers(friction, {{0.01, 0.1}})).empty());

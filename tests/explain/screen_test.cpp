@@ -141,9 +141,11 @@ TEST(PValueInItsBlocks, is_small_no_more_often_than_it_says_where_the_noise_is_f
   };
   EXPECT_LE(share_below(0.01, 1), 0.017);
   EXPECT_GE(share_below(0.05, 1), 0.015);  // a test that never rejects would say nothing
-  EXPECT_LE(share_below(0.01, 10), 0.017);
-  // So little louder that chance hides it one time in seven: by the variance elsewhere alone it is one in five.
-  EXPECT_LE(share_below(0.01, 2), 0.04);
+  // Two blocks for the noise being as elsewhere cost that much where it is not; by its variance elsewhere alone it is four in five.
+  EXPECT_LE(share_below(0.01, 10), 0.07);
+  EXPECT_LE(share_below(1e-4, 10), 0.012);
+  // So little louder that chance hides it now and then: by the variance elsewhere alone it is one in five.
+  EXPECT_LE(share_below(0.01, 2), 0.06);
   EXPECT_GE(share_below(0.01, 2), 0.005);
 }
 
@@ -152,8 +154,8 @@ TEST(PValueInItsBlocks, is_small_where_few_blocks_agree) {
   std::mt19937_64 random(9);
   int small = 0;
   for (int i = 0; i < 200; ++i) small += p_of_five(setting, 12, 1, random) < 1e-4 ? 1 : 0;
-  EXPECT_GE(small, 170);
-  for (int i = 0; i < 50; ++i) EXPECT_LT(p_of_five(setting, 100, 1, random), 1e-5);
+  EXPECT_GE(small, 190);
+  for (int i = 0; i < 50; ++i) EXPECT_LT(p_of_five(setting, 30, 1, random), 1e-6);
 }
 
 TEST(PValueOfARefit, is_small_where_two_amplitudes_are_large_in_few_blocks) {

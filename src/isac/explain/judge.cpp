@@ -24,6 +24,7 @@ constexpr double kBoundingBlocks = 25;
 constexpr double kHeldByThem = 0.9;  // of a column's squares lies in the blocks that are called its own
 constexpr int kBlocksElsewhere = 20;
 constexpr double kMostByChance = 2;  // deviations, of the largest of dozens of functions
+constexpr double kAsElsewhere = 2;   // blocks that speak for the noise being as it is elsewhere
 // Of the level at which something counts as found; and of what lies beyond it, where a share that seldom speaks would only keep p-values
 // from being uniform.
 constexpr double kShareOfEach = 0.5, kRareBeyond = 0.02;
@@ -256,11 +257,14 @@ double p_in_its_blocks(const Prepared& data, const Eigen::VectorXd& before, cons
                        const Eigen::VectorXd& error_of_means, const Elsewhere& elsewhere) {
   const std::optional<Closed> c = closed_by(data, before, after, error_of_means);
   if (!c || !(elsewhere.unit > 0)) return 1;
-  const double variance = elsewhere.unit * c->norm2.sum(), F = c->own.scatter * c->own.scatter / variance;
-  const bool louder = c->own.carried_by > 2 && F > 1;
-  return series::student_t_two_sided(
-      std::abs(c->score) / std::sqrt((louder ? F : 1.0) * variance + c->run_error2),
-      louder ? freedom_of_both(F, elsewhere.blocks, c->own.carried_by - 1) : elsewhere.blocks);
+  const double variance = elsewhere.unit * c->norm2.sum(),
+               louder = c->own.carried_by > 2 ? c->own.scatter * c->own.scatter / variance : 1.0;
+  if (!(louder > 1))
+    return series::student_t_two_sided(std::abs(c->score) / std::sqrt(variance + c->run_error2),
+                                       elsewhere.blocks);
+  const double few = c->own.carried_by - 1, F = (kAsElsewhere + few * louder) / (kAsElsewhere + few);
+  return series::student_t_two_sided(std::abs(c->score) / std::sqrt(F * variance + c->run_error2),
+                                     freedom_of_both(F, elsewhere.blocks, kAsElsewhere + few));
 }
 
 double joint_p(double flips, double rare, double level) noexcept {

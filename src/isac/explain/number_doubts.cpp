@@ -1,5 +1,6 @@
 #include "isac/explain/number_doubts.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string_view>
@@ -28,6 +29,15 @@ bool differ_by_nothing(const Estimated& a, const Estimated& b) {
          kNoDifference * std::hypot(a.std_error, b.std_error);  // false without an error
 }
 
+/// Stribeck friction whose T_s is as good as T_c.
+bool falls_by_nothing(const std::vector<Estimated>& numbers) {
+  const auto named = [&](std::string_view name) {
+    return std::find_if(numbers.begin(), numbers.end(), [&](const Estimated& e) { return e.name == name; });
+  };
+  const auto sliding = named("T_c"), rest = named("T_s");
+  return sliding != numbers.end() && rest != numbers.end() && differ_by_nothing(*sliding, *rest);
+}
+
 }  // namespace
 
 std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
@@ -39,6 +49,9 @@ std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
   for (const auto& [up, down] : pairs) alike = alike && differ_by_nothing(*up, *down);
   if (alike)
     doubts.emplace_back("Nothing in it differs by direction beyond its error: it may be something simpler.");
+  if (falls_by_nothing(numbers))
+    doubts.emplace_back(
+        "Its friction falls from rest to speed by no more than its error: it may be something simpler.");
   int amplitudes = 0;
   bool any_error = false;
   for (int i = 0; i < effect.parameter_count; ++i) {

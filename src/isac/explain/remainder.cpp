@@ -8,6 +8,7 @@
 
 #include "isac/explain/any_valve.hpp"
 #include "isac/explain/constancy.hpp"
+#include "isac/explain/end_of_reading.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/moments.hpp"
@@ -37,6 +38,7 @@ constexpr double kWorthDoubtingOfAny = 0.125;
 // Of a chain's usual power, in moments that stand out beside a name: of 198 right ones one left more than 0.06, 0.21; a clipped force for a slack muscle
 // 0.65.
 constexpr double kInMomentsBeside = 0.3;
+constexpr double kAtTheEnd = 0.6;
 constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
 
 /// Does the catalogue say that these two are taken for one another?
@@ -263,9 +265,24 @@ void Search::look_at_moments_beside() {
   say(found_.doubts.back());
 }
 
+void Search::doubt_at_the_end_of_a_reading() {
+  const bool reads_it_so = std::any_of(found_.added.begin(), found_.added.end(), [&](int h) {
+    return library_.hypotheses[static_cast<std::size_t>(h)].reads_force;
+  });
+  if (reads_it_so) return;
+  const EndOfReading end = acts_at_the_end_of_a_reading(
+      data_, found_.model.residual - found_.baseline.residual, found_.floors.all(Chain::kTorque));
+  if (end.share < kAtTheEnd) return;
+  found_.doubts.push_back(fmt::format(
+      "{:.0f} % of what it closes lies where a force reading stands at its largest, {:.4g} N: that reading "
+      "may be clipped.",
+      100 * end.share, end.force));
+}
+
 void Search::look_at_limits() {
   if (!found_.adequate || found_.added.empty()) return;
   const std::size_t before = found_.doubts.size();
+  doubt_at_the_end_of_a_reading();
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const Trial& named = found_.steps[i].trials.front();
     const char* term = library_.hypotheses[static_cast<std::size_t>(named.hypothesis)].info().term;

@@ -81,6 +81,7 @@ bool Search::closes_all_that_is_left(const Step& step) {
 }
 
 bool Search::a_rival_goes_better_with(const Step& step) {
+  constexpr double kNearlyDid = 0.2;  // of the units that the first closed is left over beside it
   if (a_rival_was_tried_ || step.trials.empty()) return false;
   a_rival_was_tried_ = true;
   std::vector<Trial>& trials = found_.steps.front().trials;
@@ -118,6 +119,7 @@ bool Search::a_rival_goes_better_with(const Step& step) {
   if (best == 0) return false;
   say(fmt::format("{} goes better with {} than {} does: it takes its place", ranking_.id_of(trials[best]),
                   ranking_.id_of(second), first));
+  found_.another_pair = found_.another_pair || step.units < kNearlyDid * largest_units_;
   put_first(best);
   found_.added.back() = trials.front().hypothesis;
   move_to(with({trials.front()}));

@@ -148,11 +148,12 @@ struct Yardstick {
 /// runs only, had p = 0.04.
 [[nodiscard]] double p_of_refit(const Prepared& data, const Eigen::VectorXd& before,
                                 const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means = {});
-/// p-value of what one refit closes in blocks so few that the noise's variance is taken from elsewhere, V = unit Σ n_b. With W = Σ (l_b/(1 − h_b))²
-/// and F = W/V: the noise may be louder in these very blocks, or of another colour, and then W counts, as few as they are:
+/// p-value of what one refit closes in blocks so few that the noise's variance is taken from elsewhere, V = unit Σ n_b. With W = Σ (l_b/(1 − h_b))²,
+/// which ν_W tell: the noise may be louder in these very blocks, or of another colour, W > V. Two blocks speak for its being as elsewhere:
 ///
-///   t = |Σ n_b + Σ l_b|/√(max(F, 1) V),  F²/(1/ν_V + (F − 1)²/ν_W) degrees of freedom where F > 1, else ν_V
+///   F = (2 + ν_W W/V)/(2 + ν_W),   t = |Σ n_b + Σ l_b|/√(F V),   F²/(1/ν_V + (F − 1)²/(2 + ν_W)) degrees of freedom
 ///
+/// (the moderated t of Smyth 2004, its prior's own weight two); where W ≤ V, t = |…|/√V with ν_V.
 /// Of 500 days without an effect in a recorded noise 24 had p ≤ 0.01 by V alone, seven of ten a compliance near 9 Hz, where few decays of the free
 /// joint were a hundred times as loud as the middle of the day.
 [[nodiscard]] double p_in_its_blocks(const Prepared& data, const Eigen::VectorXd& before,

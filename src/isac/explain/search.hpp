@@ -37,7 +37,7 @@ struct Found {
   bool adequate = true;         ///< nothing significant and material is left
   bool comes_and_goes = false;  ///< something named was not of one size throughout (constancy.hpp)
   bool another_pair =
-      false;  ///< what closed most alone left too little for a second name: two others took its place
+      false;  ///< what closed most alone left little, or too little for a second name: two others took its place
   Gate gate;  ///< of the baseline
   /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
   std::vector<std::string> doubts;

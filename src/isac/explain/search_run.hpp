@@ -203,6 +203,7 @@ class Search {
   /// A name that stands only as what it turns into at the end of its range, two sensors that err by the same, and a crowd of effects may each
   /// be one thing that the catalogue does not have.
   void look_at_limits();
+  void doubt_at_the_end_of_a_reading();
   /// A few moments that stand out beside a name are something else, or the name is wrong.
   void look_at_moments_beside();
 
