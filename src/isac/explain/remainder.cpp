@@ -38,8 +38,8 @@ constexpr double kWorthDoubtingOfAny = 0.125;
 // Of a chain's usual power, in moments that stand out beside a name: of 198 right ones one left more than 0.06, 0.21; a clipped force for a slack muscle
 // 0.65.
 constexpr double kInMomentsBeside = 0.3;
-constexpr double kAtTheEnd = 0.6;
-constexpr std::size_t kMany = 3;  // effects at once: one that none of them is may look like that
+constexpr double kAtTheEnd = 0.6;  // end_of_reading.hpp
+constexpr std::size_t kMany = 3;   // effects at once: one that none of them is may look like that
 
 /// Does the catalogue say that these two are taken for one another?
 bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo& b) {
