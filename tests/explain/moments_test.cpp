@@ -61,6 +61,14 @@ TEST(Moments, of_one_second_are_found_where_they_are) {
   EXPECT_GT(m.times_usual, 10);
 }
 
+TEST(Moments, of_a_free_joints_motion_are_bursts_of_noise_below_ten_times_the_usual) {
+  Moments burst{.share = 0.1, .chain = Chain::kMotion, .times_usual = 9};
+  EXPECT_FALSE(burst.stand_out());
+  burst.times_usual = 11;
+  EXPECT_TRUE(burst.stand_out());
+  EXPECT_TRUE((Moments{.share = 0.1, .chain = Chain::kTorque, .times_usual = 9}.stand_out()));
+}
+
 TEST(Moments, are_not_a_run_that_is_noisier_throughout) {
   const test::PreparedDay day(test::TiedRig{}, kDay);
   EXPECT_FALSE(moments_of(day.data, louder(day, 1, 0, 1e9, 6)).stand_out());

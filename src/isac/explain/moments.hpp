@@ -6,6 +6,7 @@
 ///
 /// A stop that is hit once, a clipped reading, a flow at its limit or a joint that rings after a jerk leave most of their squares in a few
 /// half seconds; a generic function of the signals sees next to nothing of them, and flips of blocks cannot pass the root of those few.
+/// In the balance of a free joint's motion a recorded noise has bursts of nine times the usual: there E_a must reach ten.
 /// A median is not moved by them. Runs that are noisier throughout are their own yardstick.
 /// Shapes: one weighted residual for each row of `data`. Units: none. Threads: pure. Errors: none. Source: docs/derivations/explain.md.
 #pragma once
@@ -18,7 +19,7 @@ namespace isac::explain {
 
 struct Moments {
   double share = 0;              ///< of the chain's usual noise power
-  Chain chain = Chain::kTorque;  ///< in which it is largest
+  Chain chain = Chain::kTorque;  ///< in which they stand out, or the share is largest
   unsigned run = 0;              ///< of the largest moment
   double time = 0;               ///< s from its run's start, the middle of it
   double times_usual = 0;        ///< its mean square over the median's
