@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -47,6 +48,20 @@ TEST(Uncertainty, of_a_torque_contains_how_the_encoder_is_read_within_its_step) 
   const double reading = std::abs(fit.model.base[0]) * r * r * half / std::sqrt(3.0);
   EXPECT_GT(reading, 3 * noise);
   EXPECT_NEAR(within.effects[0][0].std_error, std::hypot(noise, reading), 0.05 * reading);
+}
+
+// An encoder that is read at the lower end of its steps stands half of one off: no effect, and the answer says what it took it for.
+TEST(HowTheRecorderCounts, is_told_and_not_named) {
+  test::TiedRig rig;
+  rig.offset = 0.5 * rig.facts().angle_step * -rig.A * rig.radius * rig.radius;  // as good as half a step
+  const Explanation e =
+      explain(test::record_all(rig, {test::clamped(20, 0.1, 1.2, 6), test::by_hand(20, 0.5, 1.5),
+                                     test::by_hand(20, 0.4, 2.5), test::free_in_steps(16, 4, 0.8)}),
+              {}, {.rig = rig.facts(), .traces = false, .next_experiment = false});
+  EXPECT_EQ(e.verdict, Verdict::kNone) << e.summary;
+  EXPECT_TRUE(std::any_of(e.trials.begin(), e.trials.end(), [](const TrialNote& note) {
+    return note.id == "encoder_offset" && note.sentence.find("how the recorder counts") != std::string::npos;
+  }));
 }
 
 TEST(Uncertainty, of_a_leak_is_as_if_the_muscle_that_would_rather_gain_air_were_not_asked) {

@@ -341,7 +341,10 @@ bool Search::is_convention(const Step& step) {
     } else {
       continue;
     }
-    say(fmt::format("{} of {:.3g}: how the recorder counts, not an effect", id, t.values[0]));
+    const std::string sentence =
+        fmt::format("of {:.3g} it is how the recorder counts, and is left to that", t.values[0]);
+    found_.notes.push_back({id, sentence});
+    say(id + ": " + sentence);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
     move_to(found_.baseline);
     return true;
