@@ -146,6 +146,8 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"clear", "quantised", "force_saturation", "8301", R"("effects":[{"id":"force_saturation")",
              "unknown, for a zero that wanders made held-out runs further off, which freed of it spoke for "
              "the name"},
+        Miss{"clear", "white", "inertia_error", "8501", R"("effects":[{"id":"inertia_error")",
+             "a compliance of 36 Hz, which polished was at the end of its range"},
         Miss{"clear", "real", "threshold_pressure", "8401", R"("effects":[{"id":"threshold_pressure")",
              "nothing on the fitted runs, for the noise in the two blocks that carry it counted alone"},
         Miss{"leave-one-out", "white", "creep", "8102", R"("verdict":"not_separable")",

@@ -60,6 +60,13 @@ bool Ranking::is_limit_case(int hypothesis, const Values& values) const {
   return false;
 }
 
+std::size_t Ranking::simple_case_of_limit(const std::vector<Trial>& trials, const Values& values) const {
+  if (trials.empty() || !is_limit_case(trials.front().hypothesis, values)) return 0;
+  for (std::size_t i = 1; i < trials.size(); ++i)
+    if (nests(id_of(trials.front()), id_of(trials[i])) && trials[i].behind.t < kLimitReach) return i;
+  return 0;
+}
+
 bool Ranking::err_alike(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
   if (h.info().where != models::Subsystem::kSensor || h.info().parameter_count != 2 || !h.amplitude[0] ||

@@ -47,6 +47,10 @@ class Ranking {
   /// A shape at the end of its range is the simpler effect that it turns into there; a width of few steps of the encoder is none, and a
   /// friction that is hardly larger at rest is dry friction.
   [[nodiscard]] bool is_limit_case(int hypothesis, const Values& values) const;
+  /// Of the trials behind the first, whose values went on to these: the simpler one that the first is at the end of its range, as near as that
+  /// end comes; 0: none.
+  [[nodiscard]] std::size_t simple_case_of_limit(const std::vector<Trial>& trials,
+                                                 const Values& values) const;
   /// Are there two sensors of one kind, and is what they err by the same?
   [[nodiscard]] bool err_alike(const Trial& trial) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;

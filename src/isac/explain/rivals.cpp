@@ -175,6 +175,19 @@ bool Search::another_pair_closes_more(const Step& step) {
   return true;
 }
 
+void Search::leave_a_limit_to_its_simple_case() {
+  if (found_.added.size() != 1 || !found_.adequate) return;
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const std::size_t simple =
+      ranking_.simple_case_of_limit(trials, found_.model.model.effects[found_.model.tolerances].values);
+  if (simple == 0) return;
+  say(fmt::format("{} went on to the end of its range: {} takes its place", ranking_.id_of(trials.front()),
+                  ranking_.id_of(trials[simple])));
+  put_first(simple);
+  found_.added.front() = trials.front().hypothesis;
+  found_.model = polished(predictor_, with({trials.front()}), found_.weights);
+}
+
 void Search::put_first(std::size_t i) {
   std::vector<Trial>& trials = found_.steps.front().trials;
   const std::string first = ranking_.id_of(trials.front());

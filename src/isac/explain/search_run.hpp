@@ -180,6 +180,8 @@ class Search {
   /// less, one that closes more together with a second takes its place.
   bool another_pair_closes_more(const Step& step);
   /// Of the first step's trials this one is taken; what stood first is ruled out.
+  /// Polished, a shape may have gone on to the end of its range, where it is a simpler effect: that stands for it, as where it had begun there.
+  void leave_a_limit_to_its_simple_case();
   void put_first(std::size_t i);
   /// Each effect is given up once, with the others in place: another may do better, or nothing may be missed.
   void swap_and_drop();
