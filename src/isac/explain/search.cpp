@@ -380,7 +380,13 @@ void Search::doubt_the_clock() {
                     return a.hypothesis->effect == tolerance.effect &&
                            (!at_bound || std::abs(a.values[0]) > kBeyond * interval);
                   });
-  if (told) return;
+  const auto likelihood = [&](const Found& f) {
+    return log_likelihood(data_, f.weights, unfiltered(data_, f.weights, f.model.residual));
+  };
+  // Or another effect leaves so much less than the skew did that it was the skew that stood for it.
+  const bool nearer = !told && found_.adequate && !found_.added.empty() &&
+                      2 * (likelihood(found_) - likelihood(without_effect)) > kLargeForSure;
+  if (told || nearer) return;
   tolerances.insert(tolerances.begin() + at, tolerance);
   found_ = without_effect;
   responses_.forget();

@@ -94,7 +94,7 @@ class Search {
   /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
   bool is_convention(const Step& step);
   /// A skew within half a sample is tolerated, so that it stands for nothing else; where nothing else is missing and the skew is neither hardly
-  /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is.
+  /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is. What is found in its place stays if it leaves less.
   void doubt_the_clock();
   /// Beside an effect, an offset of less than half a step may be how the encoder is read. In steps; 0: none is asked for.
   double offset_within_a_step(const Step& step) const;
