@@ -57,9 +57,9 @@ bool closes_little(const Gap& gap) {
 
 bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user, const Proof& proof,
                 Chain chain, const ExplainOptions& options, Gap& gap) {
-  constexpr double kClearly = 3.0, kHardly = -1.645;    // sigma, freed of what the noise remembers
-  constexpr double kAbout = 1.01;                       // where they hardly show the effect, noise decides
-  constexpr double kLikely = 1.645, kWandersBy = 1.05;  // by more it casts a doubt
+  constexpr double kClearly = 3.0, kHardly = -1.645;  // sigma, freed of what the noise remembers
+  constexpr double kAbout = 1.01;                     // where they hardly show the effect, noise decides
+  constexpr double kLikely = 1.645, kWandersBy = 1.05, kLikelyAllTheSame = 2.576;  // by more it casts a doubt
   constexpr double kTooLittle = 8, kHardlyWorse = 1.02;
   if (found.added.empty() || proof.runs() == 0) return false;
   const bool worse = does_worse(found, proof, chain, gap);
@@ -82,14 +82,15 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
   const bool says_nothing = freed.behind.separation < kTooLittle && freed.behind.t > 0 &&
                             freed.behind.t < kLikely &&
                             gap.heldout_after <= kHardlyWorse * gap.heldout_before;
-  const bool likely = freed.behind.t >= kLikely;
+  const bool by_more = gap.heldout_after > kWandersBy * gap.heldout_before,
+             likely = freed.behind.t >= (by_more ? kLikelyAllTheSame : kLikely);
   if (slow && freed.first < freed.second && (says_nothing || likely)) {
     if (says_nothing)
       found.doubts.push_back(
           fmt::format("The held-out runs neither show nor refute it ({:.1f} sigma for it, freed of the "
                       "noise's slow part).",
                       freed.behind.t));
-    else if (gap.heldout_after > kWandersBy * gap.heldout_before)
+    else if (by_more)
       found.doubts.push_back(
           fmt::format("The held-out runs, as they were read, are {:.3g} {} off with it and {:.3g} without; "
                       "freed of the noise's slow part they speak for it, by {:.1f} sigma.",
