@@ -1,7 +1,7 @@
 /// @file
 /// Does an effect act only while a force reading stands at its largest? Then the reading may be clipped there, whatever else fits.
 ///
-///   d² = share of Σ c² of the torque's rows in which F1 or F2 ≥ its largest of the day − 8 σ/(√2 r)
+///   share = Σ' c²/Σ c²   of the torque's rows, Σ': those in which F1 or F2 ≥ its largest of the day − 8 σ/(√2 r)
 ///
 /// c: what the effect closes; σ: the torque's noise, half of its square either reading's; r: of the wheel; largest: but for two in ten thousand.
 ///

@@ -12,7 +12,7 @@ constexpr double kBeyond = 4;  // times the usual mean square: in 32 empty datas
 constexpr double kStandOut =
     0.03;  // of the noise's power; those had 0.006 at most, ten that hid such an effect 0.07 to 1.04 but for one
 // The balance of a free joint's motion differentiates the encoder's noise twice, and where a recorded one is louder for a second it had 6 to 9 times
-// the usual mean square on 6 of 370 empty days; fourteen stops that were struck had 8 to 376, and one of them less than 11.
+// the usual mean square on 6 of 370 empty days; fifteen stops that were struck had 8 to 376, and one of them less than 11.
 constexpr double kBurst = 10;
 constexpr double kFewestRows = 20;  // of an atom that counts
 constexpr std::size_t kFewestAtoms = 20;
