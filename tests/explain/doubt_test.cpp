@@ -49,6 +49,20 @@ TEST(HeldOut, does_not_refute_a_name_where_a_zero_wanders_by_more_than_the_effec
   EXPECT_TRUE(std::isnan(refuted.gap.freed_before));
 }
 
+TEST(HeldOut, runs_that_leave_more_beside_the_name_than_noise_does_cast_a_doubt) {
+  const test::TiedRig rig{.dry = 0.03}, other{.dry = 0.03, .angle_damping = 0.3};
+  const Explanation same = explained(rig, day_of(20), 100, rig, 140),
+                    more = explained(rig, day_of(20), 100, other, 140);
+  for (const Explanation* e : {&same, &more}) {
+    ASSERT_EQ(e->effects.size(), 1U) << e->summary;
+    EXPECT_EQ(e->effects.front().id, "coulomb_friction");
+  }
+  EXPECT_TRUE(same.doubts.empty()) << same.doubts.front();
+  ASSERT_EQ(more.doubts.size(), 1U);
+  EXPECT_NE(more.doubts.front().find("held-out"), std::string::npos) << more.doubts.front();
+  EXPECT_EQ(more.verdict, Verdict::kNotSeparable);
+}
+
 TEST(HeldOut, that_a_zero_wanders_there_is_nothing_that_fitted_runs_do_not_excite) {
   const test::TiedRig rig{.zero_wander = 0.02};
   const Explanation e = explained(rig, day_of(40), 400, rig, 440);

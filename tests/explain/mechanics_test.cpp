@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
 #include <utility>
 
@@ -394,6 +395,38 @@ TEST(Twins, two_sensors_that_err_by_the_same_have_one_cause) {
   EXPECT_FALSE(alike("pressure_offset", {500, -500}));
   EXPECT_FALSE(alike("pressure_offset", {500, 0}));
   EXPECT_FALSE(alike("coulomb_friction", {0.02, 0.02}));
+}
+
+// Both gains by the same: that fits a little better, by noise; it needs a coincidence, and the other does not.
+TEST(Ranking, puts_one_cause_before_two_sensors_that_err_by_the_same) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::free_in_steps(20, 1.5, 0.6)});
+  const Ranking ranking(bench.data, bench.library);
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  const auto rows = static_cast<Eigen::Index>(bench.data.rows.size());
+  Eigen::VectorXd noise(rows), apart(rows);
+  for (double& x : noise) x = normal(random);
+  for (double& x : apart) x = normal(random);
+  apart -= noise * (noise.dot(apart) / noise.squaredNorm());
+  const auto first_of = [&](double first, double second, const char* other, double sigma) {
+    std::vector<Trial> trials(2);
+    trials[0].hypothesis = static_cast<int>(bench.find("force_gain_error") - bench.library.hypotheses.data());
+    trials[0].values = {first, second};
+    trials[0].residual = noise;
+    trials[1].hypothesis = static_cast<int>(bench.find(other) - bench.library.hypotheses.data());
+    trials[1].values = {1e-3};
+    const double between =
+        compare(bench.data, noise, noise + apart, 0, noise_density(bench.data, noise)).separation;
+    trials[1].residual = noise + apart * (sigma / between);
+    for (Trial& t : trials) t.loss = t.residual.squaredNorm();
+    ranking.rank(trials, noise + apart * (100 / between));
+    return ranking.id_of(trials.front());
+  };
+  // Half of the sigma of data that lie between them it is behind.
+  EXPECT_EQ(first_of(0.05, 0.051, "inertia_error", 5), "inertia_error");
+  EXPECT_EQ(first_of(0.05, 0.051, "encoder_gain", 5), "encoder_gain");
+  EXPECT_EQ(first_of(0.05, -0.02, "inertia_error", 5), "force_gain_error");
+  EXPECT_EQ(first_of(0.05, 0.051, "inertia_error", 10), "force_gain_error") << "far behind";
 }
 
 }  // namespace

@@ -77,6 +77,17 @@ TEST(NumberDoubts, friction_that_does_not_fall_from_rest_is_something_simpler) {
   EXPECT_TRUE(doubts(0.0065).empty()) << "2.3 standard errors apart";
 }
 
+TEST(NumberDoubts, an_unbalanced_mass_that_is_level_with_the_axis_is_a_constant_torque) {
+  const models::EffectInfo& mass = info("gravity_imbalance");
+  const auto doubts = [&](double with_angle, double error) {
+    return doubts_of_numbers(mass, numbers(mass, {{with_angle, error}, {-0.00788, 0.00006}}));
+  };
+  ASSERT_EQ(doubts(-0.0003, 0.0004).size(), 1U);
+  EXPECT_NE(doubts(-0.0003, 0.0004).front().find("constant torque"), std::string::npos);
+  EXPECT_TRUE(doubts(-0.0008, 0.0004).empty()) << "two standard errors";
+  EXPECT_TRUE(doubts(0.0003, 0.0013).empty()) << "not known well enough to be a coincidence";
+}
+
 TEST(NumberDoubts, one_amplitude_or_no_error_says_nothing) {
   const models::EffectInfo& friction = info("coulomb_friction");
   EXPECT_TRUE(doubts_of_numbers(friction, numbers(friction, {{0.01, 0.1}})).empty());

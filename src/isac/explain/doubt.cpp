@@ -9,6 +9,7 @@
 #include "isac/core/units.hpp"
 #include "isac/explain/curves.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/left_over.hpp"
 #include "isac/explain/moments.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/slow_noise.hpp"
@@ -129,6 +130,28 @@ void take_away_what_is_refuted(const Predictor& predictor, const Library& librar
     found.added.erase(found.added.begin() + static_cast<std::ptrdiff_t>(k));
     found.steps.erase(found.steps.begin() + static_cast<std::ptrdiff_t>(k));
   }
+}
+
+void doubt_what_is_left(const Predictor& predictor, const Library& library, const Proof& proof,
+                        const ExplainOptions& options, Found& found) {
+  if (found.added.empty() || !found.adequate) return;
+  const LeftOfRuns left = left_of_runs(predictor.data(), library, found, proof,
+                                       {.flips = 1999,
+                                        .significance = options.significance,
+                                        .seed = options.seed,
+                                        .threads = options.threads});
+  const auto much = [&](const LeftOver& l) {
+    return casts_a_doubt(l.p_value, l.size, l.chain, found.steps.front().trials.front().material,
+                         predictor.data().baseline.terms.empty());
+  };
+  const bool of_held_out = much(left.held_out);
+  if (!of_held_out && !much(left.all)) return;
+  const LeftOver& most = of_held_out ? left.held_out : left.all;
+  found.doubts.push_back(fmt::format(
+      "What it leaves over of {} noise has on one day in {:.0f}: {:.2f} of the noise floor of the {}.",
+      of_held_out ? "the held-out runs" : "all runs, the held-out ones among them", 1 / most.p_value,
+      most.size, in_words(label_of(predictor.data(), most.chain))));
+  if (options.progress) options.progress(found.doubts.back());
 }
 
 void doubt(const Predictor& predictor, const Found& found, Explanation& e) {

@@ -36,6 +36,10 @@ namespace isac::explain {
 void take_away_what_is_refuted(const Predictor& predictor, const Library& library, const Proof& proof,
                                Found& found);
 
+/// What the model leaves of runs that it has not seen, or of all runs together, and noise does not, casts a doubt (left_over.hpp).
+void doubt_what_is_left(const Predictor& predictor, const Library& library, const Proof& proof,
+                        const ExplainOptions& options, Found& found);
+
 /// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
 void doubt(const Predictor& predictor, const Found& found, Explanation& e);
 

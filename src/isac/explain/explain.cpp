@@ -17,6 +17,7 @@
 #include "isac/explain/experiment.hpp"
 #include "isac/explain/free_torque.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/left_over.hpp"
 #include "isac/explain/number_doubts.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/quiet_pressure.hpp"
@@ -310,6 +311,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   constexpr double kFew = 25;           // units of noise on the fitted runs, five sigma
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
+    doubt_what_is_left(predictor, library, proof, options, found);
     numbers = uncertainties(predictor, found.model, found.weights);
     for (std::size_t i = 0; i < found.added.size(); ++i)
       for (std::string& why : doubts_of_numbers(

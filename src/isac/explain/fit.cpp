@@ -406,6 +406,22 @@ Fit polished(const Predictor& predictor, Fit fit, const Weights& weights) {
   return fit;
 }
 
+Fit beside_other_runs(const Predictor& predictor, const Fit& fit, ModelPoint model,
+                      Eigen::VectorXd residual) {
+  Fit there;
+  there.model = std::move(model);
+  there.tolerances = fit.tolerances;
+  std::copy_if(fit.coordinates.begin(), fit.coordinates.end(), std::back_inserter(there.coordinates),
+               [](const Coordinate& c) { return c.rest < 0; });
+  if (std::any_of(fit.coordinates.begin(), fit.coordinates.end(),
+                  [](const Coordinate& c) { return c.rest >= 0; }))
+    add_rest(predictor, there.model, kAllChains, there.coordinates);
+  there.loss = residual.squaredNorm();
+  there.residual = std::move(residual);
+  there.converged = fit.converged;
+  return there;
+}
+
 Eigen::MatrixXd sensitivities(const Predictor& predictor, const Fit& fit, const Weights& weights,
                               std::vector<Coordinate>* used, Held* held) {
   // All chains, also those that the last refit left alone.

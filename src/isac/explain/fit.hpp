@@ -48,6 +48,11 @@ struct Fit {
 /// The last steps of a fit, within the bounds that it does not touch, by Ceres.
 [[nodiscard]] Fit polished(const Predictor& predictor, Fit fit, const Weights& weights);
 
+/// A fitted model beside other runs: its coordinates, with where each of those that rest stands within a step of the encoder; `model` is of
+/// those runs.
+[[nodiscard]] Fit beside_other_runs(const Predictor& predictor, const Fit& fit, ModelPoint model,
+                                    Eigen::VectorXd residual);
+
 /// Tolerances that stand at a bound: the derivative of the rows by each, and how far it may still go, in its scale.
 struct Held {
   Eigen::MatrixXd slopes;

@@ -27,7 +27,7 @@ constexpr double kMostByChance = 2;  // deviations, of the largest of dozens of 
 constexpr double kAsElsewhere = 2;   // blocks that speak for the noise being as it is elsewhere
 // Of the level at which something counts as found; and of what lies beyond it, where a share that seldom speaks would only keep p-values
 // from being uniform.
-constexpr double kShareOfEach = 0.5, kRareBeyond = 0.02;
+constexpr double kShareOfEach = 0.5, kRareBeyond = 0.002;
 
 /// Scatter of a score without its own part: √Σ l_b²/(1 − h_b)², l_b = g_b − a n_b with a = Σ g/Σ n, h_b = n_b/Σ n, and how many parts carry it.
 struct Jackknife {

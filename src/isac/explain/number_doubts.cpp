@@ -10,6 +10,7 @@ namespace isac::explain {
 namespace {
 
 constexpr double kNoDifference = 2.0, kByItself = 1.645;  // standard errors
+constexpr double kKnownWell = 0.15;                       // of the other number
 
 /// The pairs of an effect that differs by direction, or none.
 std::vector<std::pair<const Estimated*, const Estimated*>> pairs_of(const std::vector<Estimated>& numbers) {
@@ -29,13 +30,24 @@ bool differ_by_nothing(const Estimated& a, const Estimated& b) {
          kNoDifference * std::hypot(a.std_error, b.std_error);  // false without an error
 }
 
+const Estimated* number_named(const std::vector<Estimated>& numbers, std::string_view name) {
+  const auto found =
+      std::find_if(numbers.begin(), numbers.end(), [&](const Estimated& e) { return e.name == name; });
+  return found != numbers.end() ? &*found : nullptr;
+}
+
 /// Stribeck friction whose T_s is as good as T_c.
 bool falls_by_nothing(const std::vector<Estimated>& numbers) {
-  const auto named = [&](std::string_view name) {
-    return std::find_if(numbers.begin(), numbers.end(), [&](const Estimated& e) { return e.name == name; });
-  };
-  const auto sliding = named("T_c"), rest = named("T_s");
-  return sliding != numbers.end() && rest != numbers.end() && differ_by_nothing(*sliding, *rest);
+  const Estimated *sliding = number_named(numbers, "T_c"), *rest = number_named(numbers, "T_s");
+  return sliding != nullptr && rest != nullptr && differ_by_nothing(*sliding, *rest);
+}
+
+/// A mass that hangs beside the axis, level with it, though its G_sin is known well: about its middle the joint feels a constant torque.
+bool turns_with_nothing(const std::vector<Estimated>& numbers) {
+  const Estimated *with_angle = number_named(numbers, "G_sin"), *constant = number_named(numbers, "G_cos");
+  return with_angle != nullptr && constant != nullptr &&
+         std::abs(with_angle->value) < kByItself * with_angle->std_error &&
+         with_angle->std_error < kKnownWell * std::abs(constant->value);
 }
 
 }  // namespace
@@ -52,6 +64,10 @@ std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
   if (falls_by_nothing(numbers))
     doubts.emplace_back(
         "Its friction falls from rest to speed by no more than its error: it may be something simpler.");
+  if (turns_with_nothing(numbers))
+    doubts.emplace_back(
+        "It turns with the angle by no more than its error: a constant torque, or two that nearly cancel in "
+        "the force readings, would look like it.");
   int amplitudes = 0;
   bool any_error = false;
   for (int i = 0; i < effect.parameter_count; ++i) {

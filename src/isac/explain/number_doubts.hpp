@@ -3,6 +3,7 @@
 ///
 ///   both ways alike   |x_up − x_down| < 2 √(s_up² + s_down²) of every pair: nothing in them differs by direction
 ///   falls by nothing  the same of T_s and T_c: friction at rest is none but that of sliding
+///   level with the axis   |G_sin| < 1.645 s and s < 0.15 |G_cos|: an unbalanced mass whose torque does not turn with the angle, by coincidence
 ///   only together     |x − x₀| < 1.645 s of every amplitude that has an error of its own, two amplitudes and one such at least: no one of them is
 ///                     told, and what they make together something simpler may make as well
 ///

@@ -200,6 +200,14 @@ std::string Proof::signal_that_tells(const ModelPoint& model, const Weights& wei
   return explain::signal_that_tells(place, chain);
 }
 
+Proof::Screened Proof::screened(const Fit& fit, const Weights& weights, const Library& library,
+                                const ScreenOptions& options) const {
+  if (!predictor_) return {};
+  const Fit here =
+      beside_other_runs(*predictor_, fit, moved_here(fit.model), weighted_residual(fit.model, weights));
+  return {&*data_, screen(around(*predictor_, here, weights), library, options)};
+}
+
 std::vector<Series> Proof::series(const ModelPoint& model, Chain chain) const {
   if (!predictor_) return {};
   return residual_series(*predictor_, moved_here(model), chain);

@@ -17,6 +17,7 @@
 #include "isac/explain/explanation.hpp"
 #include "isac/explain/fit.hpp"
 #include "isac/explain/quiet_pressure.hpp"
+#include "isac/explain/screen.hpp"
 #include "isac/explain/spectrum.hpp"
 
 namespace isac::explain {
@@ -62,6 +63,14 @@ class Proof {
   /// Of what the model leaves here (unknown.hpp); empty: no signal tells it.
   [[nodiscard]] std::string signal_that_tells(const ModelPoint& model, const Weights& weights,
                                               Chain chain) const;
+  /// What functions of the signals score in these runs beside the model. Its parameters' slopes are projected off, as in a screen of fitted runs:
+  /// one that is a little off for these leaves nothing.
+  struct Screened {
+    const Prepared* data = nullptr;  ///< none: no run can be compared
+    Screen screen;
+  };
+  [[nodiscard]] Screened screened(const Fit& fit, const Weights& weights, const Library& library,
+                                  const ScreenOptions& options) const;
   /// measured − predicted of each run, for what shows at the recording's rate only.
   [[nodiscard]] std::vector<Series> series(const ModelPoint& model, Chain chain) const;
   [[nodiscard]] std::vector<RunTrace> traces(const ModelPoint& before, const ModelPoint& after, Chain chain,

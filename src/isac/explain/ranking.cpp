@@ -16,6 +16,7 @@ namespace {
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 constexpr double kHardlyMore = 1.25;  // of the friction in motion: at rest it is nearly the same
 constexpr double kAlike = 0.1;        // of the larger: two sensors err by the same
+constexpr double kCoincidence = 3;    // sigma: as seldom do two sensors err by the same
 constexpr double kLimitReach =
     8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
@@ -77,6 +78,13 @@ bool Ranking::err_alike(const Trial& t) const {
   return std::abs(a - b) < kAlike * std::max(std::abs(a), std::abs(b));
 }
 
+bool Ranking::is_one_cause_of_both(const Trial& t, const Trial& both) const {
+  if (!err_alike(both)) return false;
+  const std::string sensors = id_of(both), cause = id_of(t);
+  return sensors == "force_gain_error" ? cause == "inertia_error" || cause == "encoder_gain"
+                                       : sensors == "pressure_offset" && cause == "pressure_gain_error";
+}
+
 /// Nothing forbids it, and of two that the data cannot tell apart the other is told first: what was added to a joint is seldom less than nothing.
 bool Ranking::is_against_its_name(const Trial& t) const {
   return id_of(t) == "inertia_error" && t.values[0] < 0;
@@ -121,7 +129,8 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
           twins &&
           (more < 0 || (more == 0 && ((is_against_its_name(trials[0]) && !is_against_its_name(trials[i])) ||
                                       is_likelier_cause(trials[i], trials[0]))));
-      if (!simpler && !likelier) continue;
+      const bool one_cause = trials[i].behind.t < kCoincidence && is_one_cause_of_both(trials[i], trials[0]);
+      if (!simpler && !likelier && !one_cause) continue;
       std::rotate(trials.begin(), trials.begin() + static_cast<std::ptrdiff_t>(i),
                   trials.begin() + static_cast<std::ptrdiff_t>(i) + 1);
       mark(trials);

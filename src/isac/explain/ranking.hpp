@@ -53,6 +53,9 @@ class Ranking {
                                                  const Values& values) const;
   /// Are there two sensors of one kind, and is what they err by the same?
   [[nodiscard]] bool err_alike(const Trial& trial) const;
+  /// Two sensors seldom err by the same. Gains of both forces that do scale a torque as a heavier joint does, zeros of both pressures are off as
+  /// a valve's zero is: of a name that needs the coincidence, what needs one cause may be a little behind.
+  [[nodiscard]] bool is_one_cause_of_both(const Trial& trial, const Trial& both) const;
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   [[nodiscard]] bool is_likelier_cause(const Trial& trial, const Trial& than) const;
   [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;

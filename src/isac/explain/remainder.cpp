@@ -11,6 +11,7 @@
 #include "isac/explain/end_of_reading.hpp"
 #include "isac/explain/generic_fit.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/left_over.hpp"
 #include "isac/explain/moments.hpp"
 #include "isac/explain/search_run.hpp"
 #include "isac/explain/slip_moment.hpp"
@@ -26,13 +27,7 @@ constexpr double kCloserThanChance = 1.28;
 constexpr double kWorthComparing = 0.01;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
-constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
-// Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
-constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
-                 kWorthDoubtingOfPressureIfSeldom = 0.015;
-// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred, and
-// the effect is not so strong that its equation's own error shows.
-constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldom = 0.005, kWorthDoubtingIfSeldom = 0.06, kStrong = 2;
+constexpr double kSeldom = 0.005;
 // And of all that is significant, where it is not what is most significant: 0.12 had a right name in 107, 0.133 a drift of the encoder for a slip.
 constexpr double kWorthDoubtingOfAny = 0.125;
 // Of a chain's usual power, in moments that stand out beside a name: of 198 right ones one left more than 0.06, 0.21; a clipped force for a slack muscle
@@ -237,15 +232,10 @@ void Search::look_at_remainder() {
   if (left_elsewhere_) return;  // told already
   const Gatekeeper::Sized left =
       gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
-  const bool pressure = (bit(left.chain) & kPressureChains) != 0;
-  const double of_torque = !data_.baseline.terms.empty()           ? kWorthDoubting
-                           : p <= kSeldom && first_size_ < kStrong ? kWorthDoubtingIfSeldom
-                                                                   : kWorthDoubtingOfTheJoint;
-  const double of_pressure = p <= kSeldom ? kWorthDoubtingOfPressureIfSeldom : kWorthDoubtingOfPressure;
-  const bool much = left.size >= (pressure ? of_pressure : of_torque) * first_size_,
-             much_elsewhere = data_.baseline.terms.empty() && p <= kSeldom &&
-                              gate.size >= kWorthDoubtingOfAny * first_size_;
-  if (p > kDoubtful || !(much || much_elsewhere)) return;
+  const bool joint = data_.baseline.terms.empty(),
+             much = casts_a_doubt(p, left.size, left.chain, first_size_, joint),
+             much_elsewhere = joint && p <= kSeldom && gate.size >= kWorthDoubtingOfAny * first_size_;
+  if (!much && !much_elsewhere) return;
   found_.doubts.push_back(
       fmt::format("What is left over beside it noise has on one day in {:.0f}: {:.2f} of the noise floor.",
                   1 / p, much ? left.size : gate.size));

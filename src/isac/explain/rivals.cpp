@@ -64,8 +64,10 @@ bool Search::closes_all_that_is_left(const Step& step) {
   constexpr double kUnits = 400, kOfLargest = 0.1;  // units of noise, and of what the largest effect closed
   constexpr double kSmallest = 0.2;                 // of the floor
   const Trial& second = step.trials.front();
-  if (second.material < kSmallest || units_closed(second) < std::max(kUnits, kOfLargest * largest_units_))
-    return false;
+  // Of rows that have nothing to do with its own, the largest closed units of another reading's noise.
+  const double least =
+      leaves_over_in(chains_of(second)) ? std::max(kUnits, kOfLargest * largest_units_) : kUnits;
+  if (second.material < kSmallest || units_closed(second) < least) return false;
   const Fit kept = found_.model;
   const double blocks = data_.block_seconds;
   const std::size_t notes = found_.notes.size();

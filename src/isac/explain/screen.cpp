@@ -12,7 +12,8 @@ namespace isac::explain {
 namespace {
 
 constexpr std::size_t kTogether = 8;  // functions of the dictionary that are projected at once
-constexpr double kMimicked = 3e-5;    // of a response's squares left by the projection: all of it is mimicked
+constexpr double kMimicked =
+    3e-5;  // of a response's squares in a chain, left by the projection: all is mimicked
 // The same of a function without a name: less than 3 % of v p_mean, beside the damping of that very form, held T = 6 of the encoder's own steps.
 constexpr double kMimickedFunction = 1e-3;
 
@@ -153,7 +154,9 @@ class Screening {
     }
     Eigen::MatrixXd x = rows_of(h, hypothesis, part, ways, columns);
     const Eigen::VectorXd raw = x.colwise().squaredNorm();
+    const Eigen::MatrixXd raw_of_chain = norms_by_chain(x);
     x = place_.project_columns(x);
+    leave_out_mimicked(raw_of_chain, x);
     const Eigen::MatrixXd plain = unfiltered_each(data_, *place_.weights, x);
     Done done;
     Eigen::Index first = 0;
@@ -161,7 +164,7 @@ class Screening {
       const auto m = static_cast<Eigen::Index>(ways[i].size());
       std::vector<Column> of_shape;
       for (Eigen::Index a = 0; a < m; ++a) {
-        Column c = summary(x.col(first + a), plain.col(first + a), raw[first + a], kMimicked);
+        Column c = summary(x.col(first + a), plain.col(first + a), raw[first + a], 0);
         c.hypothesis = hypothesis;
         c.shape = static_cast<int>(first_shape + i);
         c.amplitude = static_cast<int>(a);
@@ -231,6 +234,22 @@ class Screening {
     weigh(data_, *place_.weights, x);
     if (known != nullptr) *known = x.cast<float>();
     return x;
+  }
+
+  /// Σ x² of each chain, a column for each column.
+  Eigen::MatrixXd norms_by_chain(const Eigen::MatrixXd& x) const {
+    Eigen::MatrixXd norms = Eigen::MatrixXd::Zero(kChains, x.cols());
+    for (const Stretch& s : stretches_)
+      norms.row(s.chain) += x.middleRows(s.from, s.rows).colwise().squaredNorm();
+    return norms;
+  }
+
+  /// Chain by chain: a gain of the encoder that the torque's own parameters mimic moves a free joint all the same.
+  void leave_out_mimicked(const Eigen::MatrixXd& raw, Eigen::MatrixXd& x) const {
+    const Eigen::MatrixXd left = norms_by_chain(x);
+    for (Eigen::Index j = 0; j < x.cols(); ++j)
+      for (const Stretch& s : stretches_)
+        if (left(s.chain, j) < kMimicked * raw(s.chain, j)) x.col(j).segment(s.from, s.rows).setZero();
   }
 
   /// Scores of a projected response against the residual.

@@ -1,0 +1,116 @@
+#include "isac/explain/left_over.hpp"
+
+#include <cmath>
+#include <vector>
+
+namespace isac::explain {
+namespace {
+
+constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one right name in fifty has it
+// Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
+constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
+                 kWorthDoubtingOfPressureIfSeldom = 0.015;
+// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred, and
+// the effect is not so strong that its equation's own error shows.
+constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldomNoise = 0.005, kWorthDoubtingIfSeldom = 0.06,
+                 kStrong = 2;
+
+/// A screen of some runs.
+struct SomeRuns {
+  const Prepared& data;
+  std::vector<const Column*> functions{};
+
+  SomeRuns(const Prepared& of, const Screen& screen) : data(of) {
+    for (const Column& c : screen.columns)
+      if (c.hypothesis < 0) functions.push_back(&c);
+  }
+
+  /// Of the blocks, and what the error of each run's mean pressure makes of it.
+  Eigen::Index scores() const { return static_cast<Eigen::Index>(data.blocks + data.runs.size()); }
+  Eigen::VectorXd scores_of(std::size_t function) const {
+    const Column& c = *functions[function];
+    Eigen::VectorXd scores_of_blocks = Eigen::VectorXd::Zero(scores());
+    if (!(c.norm2 > 0)) return scores_of_blocks;
+    for (Eigen::Index a = 0; a < c.atom_score.size(); ++a)
+      scores_of_blocks[data.block_of_atom[static_cast<std::size_t>(a)]] += c.atom_score[a];
+    if (c.run_error.size() > 0) scores_of_blocks.tail(c.run_error.size()) = c.run_error;
+    return scores_of_blocks;
+  }
+
+  double rows_of(Chain chain) const {
+    double rows = 0;
+    for (const Row& row : data.rows) rows += row.chain == chain ? 1 : 0;
+    return rows;
+  }
+};
+
+LeftOver left_over_of(const std::vector<SomeRuns>& parts, const Found& found, const ScreenOptions& options) {
+  Eigen::Index rows = 0;
+  for (const SomeRuns& part : parts) rows += part.scores();
+  const std::size_t functions = parts.front().functions.size();
+  Eigen::MatrixXd scores(rows, static_cast<Eigen::Index>(functions));
+  double largest = 0;
+  std::size_t most = functions;
+  for (std::size_t k = 0; k < functions; ++k) {
+    auto column = scores.col(static_cast<Eigen::Index>(k));
+    Eigen::Index from = 0;
+    double sum = 0;
+    for (const SomeRuns& part : parts) {
+      column.segment(from, part.scores()) = part.scores_of(k);
+      from += part.scores();
+      if (part.functions[k]->norm2 > 0) sum += part.functions[k]->score;
+    }
+    const double norm = column.norm(), T = norm > 0 ? std::abs(sum) / norm : 0.0;
+    if (T <= largest) continue;
+    largest = T;
+    most = k;
+  }
+  LeftOver left;
+  if (most == functions) return left;
+  // The errors of mean pressures have nothing in the sum, so the largest T is less than that of the scores themselves.
+  left.p_value =
+      flip_test(scores, options.flips, options.seed, options.significance, largest, options.threads).p_value;
+  left.chain = parts.front().functions[most]->chain;
+  left.function = parts.front().functions[most]->name;
+  const auto c = static_cast<int>(left.chain);
+  double score = 0, norm2 = 0, plain_norm2 = 0, count = 0;
+  for (const SomeRuns& part : parts) {
+    const Column& column = *part.functions[most];
+    count += part.rows_of(left.chain);
+    if (!(column.norm2 > 0)) continue;
+    score += column.score;
+    norm2 += column.norm2;
+    plain_norm2 += column.plain_norm2[c];
+  }
+  const double sigma = found.weights.sigma[c], white = found.floors.white[c];
+  if (norm2 > 0 && count > 0)
+    left.size = std::abs(score) / norm2 * std::sqrt(plain_norm2 / count) *
+                (std::isfinite(white) && white > sigma ? sigma / white : 1.0);
+  return left;
+}
+
+}  // namespace
+
+LeftOfRuns left_of_runs(const Prepared& data, const Library& library, const Found& found, const Proof& proof,
+                        const ScreenOptions& options) {
+  if (found.steps.size() <= found.added.size()) return {};  // nothing was looked for beside what was named
+  ScreenOptions only_functions = options;
+  only_functions.dictionary = true;
+  only_functions.only.emplace();
+  const Proof::Screened unseen = proof.screened(found.model, found.weights, library, only_functions);
+  if (unseen.data == nullptr) return {};
+  const SomeRuns fitted(data, found.steps.back().screen), held_out(*unseen.data, unseen.screen);
+  if (fitted.functions.empty() || fitted.functions.size() != held_out.functions.size()) return {};
+  return {left_over_of({fitted, held_out}, found, options), left_over_of({held_out}, found, options)};
+}
+
+bool casts_a_doubt(double p_value, double size, Chain chain, double first_size, bool joint) noexcept {
+  const bool seldom = p_value <= kSeldomNoise, pressure = (bit(chain) & kPressureChains) != 0;
+  const double of_torque = !joint                           ? kWorthDoubting
+                           : seldom && first_size < kStrong ? kWorthDoubtingIfSeldom
+                                                            : kWorthDoubtingOfTheJoint;
+  const double of_pressure = seldom ? kWorthDoubtingOfPressureIfSeldom : kWorthDoubtingOfPressure;
+  return p_value <= kDoubtful && size >= (pressure ? of_pressure : of_torque) * first_size;
+}
+
+}  // namespace isac::explain
