@@ -245,6 +245,19 @@ TEST(Colour, is_read_off_a_residual) {
   EXPECT_LE(wandering, 1);  // three standard errors
 }
 
+// A filter that takes off what is not there makes neighbouring blocks cancel, and p-values large.
+TEST(Colour, of_white_noise_is_none) {
+  const Prepared data = rows_of_runs(10, 3000);
+  constexpr int kSeeds = 200;
+  int coloured = 0, found = 0;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    coloured += colour_of(data, noise(data, 1, 0, 0.1, 0, 1000 + seed), Chain::kTorque).slow > 0 ? 1 : 0;
+    found += colour_of(data, noise(data, 1, 0.05, 0.3, 0, 2000 + seed), Chain::kTorque).slow > 0 ? 1 : 0;
+  }
+  EXPECT_LE(coloured, 0.03 * kSeeds);  // three sigma, of the best of some memories
+  EXPECT_EQ(found, kSeeds) << "a twentieth of the white part's variance";
+}
+
 TEST(Colour, finds_a_zero_that_wanders_by_a_fifth_of_the_rows_noise) {
   const Prepared data = rows_of_runs(6, 5600, 0);
   int found = 0;

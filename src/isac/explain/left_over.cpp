@@ -1,5 +1,6 @@
 #include "isac/explain/left_over.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -15,14 +16,28 @@ constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldomNoise = 0.005, kWorthDoubtingIfSeldom = 0.06,
                  kStrong = 2;
 
-/// A screen of some runs.
+std::vector<const Column*> function_columns(const Screen& screen) {
+  std::vector<const Column*> functions;
+  for (const Column& c : screen.columns)
+    if (c.hypothesis < 0) functions.push_back(&c);
+  return functions;
+}
+
+/// Some runs and what `functions` score in them; those of a chain that they have no rows of score nothing.
 struct SomeRuns {
   const Prepared& data;
   std::vector<const Column*> functions{};
 
-  SomeRuns(const Prepared& of, const Screen& screen) : data(of) {
-    for (const Column& c : screen.columns)
-      if (c.hypothesis < 0) functions.push_back(&c);
+  SomeRuns(const Prepared& of, const std::vector<const Column*>& asked,
+           const std::vector<const Column*>& known)
+      : data(of) {
+    static const Column kNone;
+    for (const Column* a : asked) {
+      const auto same = std::find_if(known.begin(), known.end(), [&](const Column* c) {
+        return c->chain == a->chain && c->name == a->name;
+      });
+      functions.push_back(same != known.end() ? *same : &kNone);
+    }
   }
 
   /// Of the blocks, and what the error of each run's mean pressure makes of it.
@@ -44,14 +59,15 @@ struct SomeRuns {
   }
 };
 
-LeftOver left_over_of(const std::vector<SomeRuns>& parts, const Found& found, const ScreenOptions& options) {
+/// `functions`: in the order of the runs' own.
+LeftOver left_over_of(const std::vector<SomeRuns>& parts, const std::vector<const Column*>& functions,
+                      const Found& found, const ScreenOptions& options) {
   Eigen::Index rows = 0;
   for (const SomeRuns& part : parts) rows += part.scores();
-  const std::size_t functions = parts.front().functions.size();
-  Eigen::MatrixXd scores(rows, static_cast<Eigen::Index>(functions));
+  Eigen::MatrixXd scores(rows, static_cast<Eigen::Index>(functions.size()));
   double largest = 0;
-  std::size_t most = functions;
-  for (std::size_t k = 0; k < functions; ++k) {
+  std::size_t most = functions.size();
+  for (std::size_t k = 0; k < functions.size(); ++k) {
     auto column = scores.col(static_cast<Eigen::Index>(k));
     Eigen::Index from = 0;
     double sum = 0;
@@ -66,12 +82,12 @@ LeftOver left_over_of(const std::vector<SomeRuns>& parts, const Found& found, co
     most = k;
   }
   LeftOver left;
-  if (most == functions) return left;
+  if (most == functions.size()) return left;
   // The errors of mean pressures have nothing in the sum, so the largest T is less than that of the scores themselves.
   left.p_value =
       flip_test(scores, options.flips, options.seed, options.significance, largest, options.threads).p_value;
-  left.chain = parts.front().functions[most]->chain;
-  left.function = parts.front().functions[most]->name;
+  left.chain = functions[most]->chain;
+  left.function = functions[most]->name;
   const auto c = static_cast<int>(left.chain);
   double score = 0, norm2 = 0, plain_norm2 = 0, count = 0;
   for (const SomeRuns& part : parts) {
@@ -99,9 +115,12 @@ LeftOfRuns left_of_runs(const Prepared& data, const Library& library, const Foun
   only_functions.only.emplace();
   const Proof::Screened unseen = proof.screened(found.model, found.weights, library, only_functions);
   if (unseen.data == nullptr) return {};
-  const SomeRuns fitted(data, found.steps.back().screen), held_out(*unseen.data, unseen.screen);
-  if (fitted.functions.empty() || fitted.functions.size() != held_out.functions.size()) return {};
-  return {left_over_of({fitted, held_out}, found, options), left_over_of({held_out}, found, options)};
+  const std::vector<const Column*> functions = function_columns(found.steps.back().screen);
+  if (functions.empty()) return {};
+  const SomeRuns fitted(data, functions, functions),
+      held_out(*unseen.data, functions, function_columns(unseen.screen));
+  return {left_over_of({fitted, held_out}, functions, found, options),
+          left_over_of({held_out}, functions, found, options)};
 }
 
 bool casts_a_doubt(double p_value, double size, Chain chain, double first_size, bool joint) noexcept {

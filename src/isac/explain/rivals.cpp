@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "isac/explain/gate.hpp"
+#include "isac/explain/labels.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/search_run.hpp"
 #include "isac/explain/workers.hpp"
@@ -79,6 +80,12 @@ bool Search::closes_all_that_is_left(const Step& step) {
   found_.notes.resize(notes);
   cut_blocks(data_, blocks);
   move_to(kept);
+  // One cause that enters both readings, a pressure sensor's gain, looks like that too: unequal muscles with a leak.
+  if (nothing && units_closed(second) < kOfLargest * largest_units_)
+    found_.doubts.push_back(fmt::format(
+        "{} is small beside what was found in other readings: one effect that enters both, and that the "
+        "catalogue does not have, may look like that.",
+        upper_first(active_of(second).hypothesis->info().term)));
   return nothing;
 }
 

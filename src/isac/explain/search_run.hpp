@@ -90,6 +90,8 @@ class Search {
   void leave_a_little(const Step& step);
   /// Of an effect that a tolerance took its share of, with that share.
   double whole_size(const Trial& t) const;
+
+  // What of a reading the recorder makes: conventions.cpp.
   /// How a recorder counts is no effect: an encoder that is read at the lower end of its steps stands half a step off, a command that
   /// is written before or after its sample half a sample or one. Such a value becomes a tolerance, and the search begins anew.
   bool is_convention(const Step& step);
