@@ -19,7 +19,7 @@ constexpr double kMostByTolerance =
     2;  // of what stands beyond it: less beyond than within is the tolerance's own error
 constexpr double kLittle = 0.05;  // of the units that an effect closed: a doubt of its name, and no more
 constexpr double kHardlyAnything =
-    0.01;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
+    0.005;  // of the units of noise that an effect closed: its equation and the noise's model are no truer
 
 }  // namespace
 

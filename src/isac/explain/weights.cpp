@@ -336,14 +336,13 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   const auto first = static_cast<std::size_t>(std::ceil(kKernelForgets * kernel / spacing));
   if (first + 8 > lags || !(covariance[0] > 0)) return none;
 
-  // Density at low frequencies if there was nothing slow: what a sum of covariances beyond the kernel scatters by.
-  double still = covariance[0];
-  for (std::size_t lag = 1; lag < first; ++lag) still += 2 * covariance[lag];
-  still = std::max(still, 0.1 * covariance[0]);
-
   Colour best;
   best.wander = wander_of(pieces, static_cast<std::size_t>(std::lround(kWanderBin / spacing)));
   const double wander = std::clamp(covariance[std::min(lags, first * 4)], 0.0, best.wander);
+  // Density at low frequencies if there was nothing slow: what a sum of covariances beyond the kernel scatters by.
+  double still = covariance[0] - wander;
+  for (std::size_t lag = 1; lag < first; ++lag) still += 2 * (covariance[lag] - wander);
+  still = std::max(still, 0.1 * covariance[0]);
   double least = std::numeric_limits<double>::infinity();
   for (int m = 0; m < kMemories; ++m) {
     const double memory = kShortest * std::pow(kLongest / kShortest, m / (kMemories - 1.0));
