@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(
              "protocol"},
         Miss{"clear", "white", "threshold_pressure", "7001", R"("effects":[{"id":"threshold_pressure")",
              "nothing, for only a free joint fell below that pressure", "protocol"},
-        Miss{"clear", "quantised", "dead_time", "7001", R"("verdict":"none")",
+        Miss{"clear", "quantised", "dead_time", "7001", R"("verdict":"immaterial")",
              "unknown in the torque, where even strokes let the encoder's steps beat with the clock",
              "protocol"},
         Miss{"clear", "coloured", "pressure_dependent_damping", "7002",
