@@ -262,6 +262,15 @@ void Search::swap_and_drop() {
       }
       say(fmt::format("{} does better in place of {}", ranking_.id_of(step.trials.front()),
                       ranking_.id_of(chosen[i])));
+      const bool in_set = std::any_of(step.trials.begin(), step.trials.end(), [&](const Trial& t) {
+        return t.in_set && t.hypothesis == chosen[i].hypothesis;
+      });
+      // Two pairs that do about as well, and one effect that the catalogue does not have may be like either.
+      if (!in_set && worse > -kLargeForSure)
+        found_.doubts.push_back(fmt::format(
+            "{} in the place of {} leaves about as little: one effect that is neither may look like both.",
+            upper_first(active_of(chosen[i]).hypothesis->info().term),
+            active_of(step.trials.front()).hypothesis->info().term));
       changed = true;
     }
     chosen[i] = step.trials.front();
