@@ -7,7 +7,8 @@
 ///
 /// More blocks tell more, and a name that only bent the fitted runs towards it leaves of the others what it never closed. Only functions without a
 /// name are asked: the search has asked the catalogue. The model's own slopes are projected off, of held-out rows its slopes there: a parameter that
-/// is a little off for them leaves nothing (screen.hpp).
+/// is a little off for them leaves nothing (screen.hpp). Functions are of signals scaled to the range of their own runs: where held-out runs have
+/// another range than fitted ones, both together weigh them unequally, which any weights may.
 /// Units: sizes in noise floors. Threads: uses up to `threads`. Errors: none; p = 1 where no held-out run can be compared.
 /// Source: docs/derivations/explain.md.
 #pragma once
