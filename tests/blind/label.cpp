@@ -93,7 +93,13 @@ std::string label_of(const Dataset& d, const Gap& noise, const Gap& closes, cons
         .key("rivals")
         .open('{');
     for (const auto& [id, sigma] : oracle->rivals) json.field(id, sigma);
-    json.close('}').list("class", oracle->equals).close('}');
+    json.close('}').list("class", oracle->equals);
+    if (!oracle->alone.empty()) {
+      json.key("alone").open('{');
+      for (const auto& [id, sigma] : oracle->alone) json.field(id, sigma);
+      json.close('}');
+    }
+    json.close('}');
   }
   return json.close('}').text() + "\n";
 }

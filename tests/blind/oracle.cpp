@@ -68,6 +68,9 @@ class Oracle {
     std::vector<const Column*> truth;
     for (const Column& column : true_columns_) truth.push_back(&column);
     v.self = fit_.distance(truth);
+    if (d_.hidings.size() > 1)
+      for (std::size_t kept = 0; kept < d_.hidings.size(); ++kept)
+        v.alone[d_.hidings[kept].effect->id] = fit_.distance({&true_columns_[kept]});
     Random random(d_.request.seed ^ 0xa0761d6478bd642full);
     for (const Effect& rival : effects()) {
       if (!rival.catalogued || hidden(rival.id)) continue;

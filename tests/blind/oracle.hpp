@@ -24,6 +24,8 @@ struct Verdict {
   std::map<std::string, double>
       rivals;  ///< by id; of two hidden effects the one that is more easily swapped for it
   std::vector<std::string> equals;  ///< rivals below three sigma
+  /// Of two hidden effects, by id: sigma between the truth and a model that holds this one alone.
+  std::map<std::string, double> alone;
 };
 
 /// `dataset` must be testable and must hide something. Deterministic: what is drawn comes from the dataset's seed.

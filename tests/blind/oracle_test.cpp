@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace blind {
 namespace {
@@ -46,6 +47,17 @@ TEST(Oracle, tells_friction_from_its_rivals_when_it_is_clear) {
   // Friction that grows with pressure is nearer than anything that is no friction.
   EXPECT_LT(v.rivals.at("pressure_dependent_friction"), v.rivals.at("hysteresis"));
   EXPECT_LT(v.rivals.at("hysteresis"), v.rivals.at("cubic_stiffness"));
+}
+
+TEST(Oracle, of_two_effects_says_what_either_leaves_by_itself) {
+  // A leak shows in the pressures and friction in the torque: squares of what they leave of each other add up.
+  const Verdict v = judge(make_dataset({.seed = 4, .ids = {"leak", "coulomb_friction"}}));
+  ASSERT_EQ(v.alone.size(), 2u);
+  EXPECT_NEAR(std::hypot(v.alone.at("leak"), v.alone.at("coulomb_friction")), v.none, 0.05 * v.none);
+  EXPECT_GT(v.alone.at("leak"), 10.0);
+  EXPECT_GT(v.alone.at("coulomb_friction"), 10.0);
+  // Of one there is nothing to be left.
+  EXPECT_TRUE(judge(make_dataset({.seed = 2, .ids = {"torque_offset"}})).alone.empty());
 }
 
 TEST(Oracle, counts_more_sigma_the_stronger_the_effect) {

@@ -56,6 +56,22 @@ TEST(NumberDoubts, amplitudes_that_are_told_only_together) {
   EXPECT_TRUE(doubts(0.0, 0.03).empty());
 }
 
+TEST(NumberDoubts, a_warm_up_that_changes_a_constant_torque_only_may_be_a_zero_that_drifts) {
+  const models::EffectInfo& drift = info("thermal_drift");
+  ASSERT_STREQ(drift.parameters[0].name, "a");
+  ASSERT_STREQ(drift.parameters[2].name, "T_0");
+  const auto doubts = [&](double stiffness, double gain, double constant) {
+    return doubts_of_numbers(drift,
+                             numbers(drift, {{stiffness, 20}, {gain, 0.1}, {constant, 0.01}, {1000, 1100}}));
+  };
+  ASSERT_EQ(doubts(18, -0.1, -0.019).size(), 1U);
+  EXPECT_NE(doubts(18, -0.1, -0.019).front().find("zero that drifts"), std::string::npos);
+  EXPECT_TRUE(doubts(-350, -0.1, -0.019).empty()) << "the stiffness is told";
+  EXPECT_TRUE(doubts(18, 0.3, -0.019).empty()) << "the gain is told";
+  ASSERT_EQ(doubts(18, -0.1, -0.009).size(), 1U);
+  EXPECT_NE(doubts(18, -0.1, -0.009).front().find("told by itself"), std::string::npos) << "nothing is told";
+}
+
 TEST(NumberDoubts, an_amplitude_that_no_run_tells_is_not_told_by_the_other) {
   const models::EffectInfo& gains = info("force_gain_error");
   const double one = gains.parameters[0].null_value / gains.parameters[0].si_per_unit,

@@ -81,6 +81,30 @@ TEST(SpectralLines, says_so_where_the_phase_is_another_one_in_every_run) {
     EXPECT_NEAR(std::hypot(phase_in(runs[r], 3.7).sine, phase_in(runs[r], 3.7).cosine), 1, 1e-12);
 }
 
+// Six phases by chance point the same way by half of their length on one day in twenty; a line that was believed to repeat then added to
+// held-out runs what it should have taken out of them.
+TEST(SpectralLines, phases_by_chance_seldom_pass_for_one_clock_and_one_clock_is_told_under_noise) {
+  std::mt19937 random(21);
+  std::uniform_real_distribution<double> turn(0, kTurn);
+  int by_chance = 0, found = 0, told = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    std::vector<Series> runs = noise_runs(random, Noise::kWhite, 6, 1024);
+    std::vector<double> phases(6);
+    for (double& phase : phases) phase = turn(random);
+    add_line(runs, 31.0, 0.4, phases);
+    if (const auto lines = spectral_lines(runs, 0.001); !lines.empty()) {
+      ++found;
+      by_chance += lines[0].repeats ? 1 : 0;
+    }
+    runs = noise_runs(random, Noise::kWhite, 6, 1024);
+    add_line(runs, 31.0, 0.4, std::vector<double>(6, phases[0]));
+    if (const auto lines = spectral_lines(runs, 0.001); !lines.empty()) told += lines[0].repeats ? 1 : 0;
+  }
+  EXPECT_GE(found, 290);
+  EXPECT_LE(by_chance, 5) << "of " << found;  // 1.1 % at most by Rayleigh's test, 3.4 of 300
+  EXPECT_GE(told, 285);
+}
+
 // What a strong line leaks into the bins beside its own says as much as any: the cap makes them alike.
 TEST(SpectralLines, finds_a_strong_line_where_it_is_and_not_a_bin_beside_it) {
   std::mt19937 random(6);

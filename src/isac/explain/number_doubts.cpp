@@ -50,6 +50,16 @@ bool turns_with_nothing(const std::vector<Estimated>& numbers) {
          with_angle->std_error < kKnownWell * std::abs(constant->value);
 }
 
+/// A warm-up in which neither the stiffness nor the gain is told to change, and a constant torque is: a zero that drifts looks like it.
+bool warms_nothing_up(const std::vector<Estimated>& numbers) {
+  const Estimated *stiffness = number_named(numbers, "a"), *gain = number_named(numbers, "b"),
+                  *constant = number_named(numbers, "T_0");
+  return stiffness != nullptr && gain != nullptr && constant != nullptr &&
+         std::abs(constant->value) >= kByItself * constant->std_error &&
+         std::abs(stiffness->value) < kByItself * stiffness->std_error &&
+         std::abs(gain->value) < kByItself * gain->std_error;
+}
+
 }  // namespace
 
 std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
@@ -68,6 +78,10 @@ std::vector<std::string> doubts_of_numbers(const models::EffectInfo& effect,
     doubts.emplace_back(
         "It turns with the angle by no more than its error: a constant torque, or two that nearly cancel in "
         "the force readings, would look like it.");
+  if (warms_nothing_up(numbers))
+    doubts.emplace_back(
+        "Neither stiffness nor gain is told to change with it, only a constant torque: a zero that drifts "
+        "looks like it.");
   int amplitudes = 0;
   bool any_error = false;
   for (int i = 0; i < effect.parameter_count; ++i) {

@@ -65,24 +65,34 @@ std::string sigma_ahead(const Comparison& behind) {
   return fmt::format("{:.1f} sigma {}", std::abs(behind.t), behind.t > 0 ? "ahead" : "behind");
 }
 
-/// Of all steps between two runs the one that takes most from the torque.
+/// Of all steps between two runs the one that leaves least, tolerances come back as they do beside a name: of the torque, or of the torque and the
+/// motion, as a zero of the encoder or of the forces does that moved.
 GenericFit best_step_between_runs(const Around& place) {
   const Prepared& data = place.predictor->data();
   GenericFit best{
       .chain = Chain::kTorque, .functions = {}, .of_reading = {}, .gain = 0, .residual = place.residual};
-  for (std::size_t first = 1; first < data.runs.size(); ++first) {
-    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
-    for (std::size_t i = 0; i < data.rows.size(); ++i)
-      if (data.rows[i].chain == Chain::kTorque && data.rows[i].run >= first)
-        rows[static_cast<Eigen::Index>(i)] = 1;
-    weigh(data, *place.weights, rows);
-    rows = place.project(rows);
-    const double norm = rows.norm(), score = norm > 1e-6 ? rows.dot(place.residual) / norm : 0;
-    if (score * score <= best.gain) continue;
-    best.gain = score * score;
-    best.functions = {first};
-    best.residual = place.residual - rows * (score / norm);
+  double least = place.residual.squaredNorm();
+  for (const double in_motion : {0.0, 1.0, -1.0}) {
+    if (in_motion != 0 && !data.has(Chain::kMotion)) continue;
+    for (std::size_t first = 1; first < data.runs.size(); ++first) {
+      Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+      for (std::size_t i = 0; i < data.rows.size(); ++i) {
+        if (data.rows[i].run < first) continue;
+        if (data.rows[i].chain == Chain::kTorque) rows[static_cast<Eigen::Index>(i)] = 1;
+        if (data.rows[i].chain == Chain::kMotion) rows[static_cast<Eigen::Index>(i)] = in_motion;
+      }
+      weigh(data, *place.weights, rows);
+      rows = place.project(rows);
+      if (!(rows.norm() > 1e-6)) continue;
+      Eigen::VectorXd left = place.left_beside(rows);
+      const double loss = left.squaredNorm();
+      if (loss >= least) continue;
+      least = loss;
+      best.functions = {first};
+      best.residual = std::move(left);
+    }
   }
+  best.gain = place.residual.squaredNorm() - least;
   return best;
 }
 

@@ -65,9 +65,9 @@ bool Search::closes_all_that_is_left(const Step& step) {
   constexpr double kUnits = 400, kOfLargest = 0.1;  // units of noise, and of what the largest effect closed
   constexpr double kSmallest = 0.2;                 // of the floor
   const Trial& second = step.trials.front();
-  // Of rows that have nothing to do with its own, the largest closed units of another reading's noise.
-  const double least =
-      leaves_over_in(chains_of(second)) ? std::max(kUnits, kOfLargest * largest_units_) : kUnits;
+  // Elsewhere the largest closed units of another reading's noise, which say nothing of this one's: a shifted pressure closes ten times more
+  // of the pressures than of the torque.
+  const double least = std::max(kUnits, kOfLargest * most_units_closed_in(together_with(chains_of(second))));
   if (second.material < kSmallest || units_closed(second) < least) return false;
   const Fit kept = found_.model;
   const double blocks = data_.block_seconds;
@@ -87,6 +87,24 @@ bool Search::closes_all_that_is_left(const Step& step) {
         "catalogue does not have, may look like that.",
         upper_first(active_of(second).hypothesis->info().term)));
   return nothing;
+}
+
+double Search::most_units_closed_in(unsigned chains) const {
+  double most = 0;
+  const Eigen::VectorXd* before = &found_.baseline.residual;
+  for (std::size_t i = 0; i < found_.added.size(); ++i) {
+    const Trial& t = found_.steps[i].trials.front();
+    double closed = 0;
+    for (std::size_t k = 0; k < data_.rows.size(); ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      if ((bit(data_.rows[k].chain) & chains) != 0)
+        closed += (*before)[row] * (*before)[row] - t.residual[row] * t.residual[row];
+    }
+    most = std::max(most,
+                    closed / compare(data_, t.residual, *before, 0, noise_density(data_, t.residual)).unit);
+    before = &t.residual;
+  }
+  return most;
 }
 
 bool Search::a_rival_goes_better_with(const Step& step) {

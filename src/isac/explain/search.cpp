@@ -153,7 +153,7 @@ void Search::forward() {
     found_.adequate = !open;
     if (!open && no_zero_wanders_beside_it()) continue;
     if (open && found_.added.empty() && is_convention(step)) continue;
-    if (open && found_.added.empty() && a_wandering_zero_was_hidden_by(step)) {
+    if (open && found_.added.size() < 2 && a_wandering_zero_was_hidden_by(step)) {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }

@@ -122,6 +122,8 @@ class Search {
   /// And what is missing may look like such a zero where the runs, or the levels within one, differ by it: beside what was found it is none, and the
   /// search begins anew with a zero that stands still.
   bool no_zero_wanders_beside_it();
+  /// The search forgets what it added. Once only.
+  void begin_anew_with_noise_of(const Eigen::VectorXd& rows);
   /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).
   void take_colour(const Eigen::VectorXd& left_over);
   /// The noise's colour once more, from what an adequate model leaves: as it was found beside generic functions it holds some of the effect.
@@ -144,9 +146,11 @@ class Search {
   /// Linear responses let runs at rest stand where they will; within a step of the encoder, as a joint refit has them, they may tell when it
   /// slipped.
   void choose_moment(Step& step) const;
-  /// Where a force's reading is clipped, rows of the torque are not linear in the baseline, and off which it was projected holds nearby only: a rival that
-  /// moves it far (a gain of the encoder for an added inertia) is refitted with it before it is ruled out.
-  void fit_with_the_baseline(std::vector<Trial>& trials) const;
+  /// Where a force's reading is clipped, or something added begins at a place that is fitted (a slack muscle's angle), rows of the torque are not
+  /// linear in what was fitted, and off which they were projected holds nearby only: a rival that moves it far (a gain of the encoder for an added
+  /// inertia) is refitted with it before it is ruled out. Those further behind than this, in sigma, are left.
+  void fit_with_the_baseline(std::vector<Trial>& trials, double nearer_than) const;
+  bool bends_in_the_angle() const;
   /// What it leaves of this place with its amplitude alone told by the data, not the states that its refit read off them.
   Eigen::VectorXd left_as_known_beforehand(const Trial& t) const;
   Trial refit_one(const Screened& candidate) const;
@@ -170,6 +174,8 @@ class Search {
   bool is_empty_promise(const Trial& t, const Screen& s) const;
   Active active_of(const Trial& t) const;
   double units_closed(const Trial& t) const;
+  /// The most that one of those added closed of rows of these chains, in units of the noise.
+  double most_units_closed_in(unsigned chains) const;
   Fit with(const std::vector<Trial>& effects) const;
 
   // What may take an effect's place: rivals.cpp.

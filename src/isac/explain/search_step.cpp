@@ -22,6 +22,7 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kWorthALook = 0.5;    // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;   // of the linear gain
 constexpr double kNearlyAsWell = 0.6;  // of the gain: another moment of a slip
+constexpr double kFewSigma = 15;       // that a place in the shape of what was added may be worth
 constexpr double kNear = 0.7, kFarUnits = 400;  // of the best gain, and units of noise
 
 }  // namespace
@@ -83,13 +84,17 @@ bool Search::no_zero_wanders_beside_it() {
   take_colours(data_, beside_functions(rows), weights);
   if (a_zero_wanders(weights)) return false;
   say("beside it the force sensors' zero does not wander: once more with one that stands still");
+  begin_anew_with_noise_of(rows);
+  return true;
+}
+
+void Search::begin_anew_with_noise_of(const Eigen::VectorXd& rows) {
   colour_beside_best_ = true;
   found_.added.clear();
   found_.steps.clear();
   found_.doubts.clear();  // of what was added
   first_size_ = largest_size_ = largest_units_ = 0;
   take_colour(rows);
-  return true;
 }
 
 bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
@@ -98,10 +103,10 @@ bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
   Weights weights = found_.weights;
   take_colours(data_, beside_functions(rows), weights);
   if (!a_zero_wanders(weights)) return false;
-  say(ranking_.id_of(step.trials.front()) +
-      " had hidden that the force sensors' zero wanders: once more beside it");
-  colour_beside_best_ = true;
-  take_colour(rows);
+  say((found_.added.empty() ? "" : ranking_.id_of(found_.steps.back().trials.front()) + " and ") +
+      ranking_.id_of(step.trials.front()) +
+      " had hidden that the force sensors' zero wanders: once more beside what they leave");
+  begin_anew_with_noise_of(rows);
   return true;
 }
 
@@ -299,12 +304,21 @@ std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
   return trials;
 }
 
-void Search::fit_with_the_baseline(std::vector<Trial>& trials) const {
+bool Search::bends_in_the_angle() const {
+  return std::any_of(found_.added.begin(), found_.added.end(), [&](int added) {
+    const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(added)];
+    return (h.chains & kForceChains) != 0 &&
+           std::any_of(h.amplitude.begin(), h.amplitude.begin() + h.info().parameter_count,
+                       [](bool amplitude) { return !amplitude; });
+  });
+}
+
+void Search::fit_with_the_baseline(std::vector<Trial>& trials, double nearer_than) const {
   if (trials.empty()) return;
   const Trial first = trials.front();
   share_work(options_.threads, trials.size(), [&](std::size_t i) {
     Trial& t = trials[i];
-    if (!ranking_.share_readings(t, first)) return;
+    if (!ranking_.share_readings(t, first) || told_behind(t.behind) > nearer_than) return;
     const Fit fit = refit(predictor_, found_.model, {active_of(t)}, found_.weights, 12);
     Eigen::VectorXd residual = place_.project(fit.residual);
     const double loss = residual.squaredNorm();
@@ -342,7 +356,10 @@ Step Search::refitted(Step step) {
   });
   if (!ignored.empty()) step.gate = gate_of(step.screen, ignored);
   ranking_.rank(step.trials, place_.residual);
-  if (clips_force(found_.model.model)) fit_with_the_baseline(step.trials);
+  if (clips_force(found_.model.model))
+    fit_with_the_baseline(step.trials, std::numeric_limits<double>::infinity());
+  else if (bends_in_the_angle())
+    fit_with_the_baseline(step.trials, kFewSigma);
   choose_moment(step);
   if (found_.added.empty()) put_material_first(step);
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.

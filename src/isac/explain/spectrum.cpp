@@ -20,7 +20,9 @@ constexpr double kStandsOut = 3.0;    // nats
 constexpr double kDriven = 7.0;       // nats by which a line of the motion is one
 constexpr double kSettling = 0.4;     // s at the start of a run that no residual counts (proof.hpp)
 constexpr int kHarmonics = 15;
-constexpr double kCoherent = 0.5;  // |Σ amplitudes|² over R Σ |amplitude|²: phases by one clock
+// Of the squares of a line's amplitudes, without the noise's, what may differ between runs where the phase is that of one clock. Phases
+// by chance stay below it in one of exp(0.75 R) cases at most, which of six runs is one in ninety (Rayleigh's test).
+constexpr double kIncoherent = 0.25;
 
 bool only_small_factors(std::size_t n) {
   for (const std::size_t p : {2U, 3U, 5U})
@@ -197,7 +199,9 @@ void measure(std::span<const Series> runs, const std::vector<Spectrum>& spectra,
       if (std::isfinite(v)) power += v * v;
   }
   const double count = static_cast<double>(which.size());
-  line.repeats = count < 1.5 || (sine * sine + cosine * cosine) > kCoherent * count * squares;
+  const double noise = 2 * error2,  // of all `squares`
+      differ = squares - (sine * sine + cosine * cosine) / count;
+  line.repeats = count < 1.5 || differ < noise + kIncoherent * std::max(0.0, squares - noise);
   line.sine = sine / count;
   line.cosine = cosine / count;
   // The square of an amplitude that noise made is taken off.
