@@ -52,6 +52,7 @@ json write_truth(const Truth& t, const std::set<std::string>& gap_signals) {
   w.add("depends_on", t.depends_on);
   w.add("nearest_equal", t.nearest_equal);
   w.add("equals", t.equals);
+  w.add("alone", t.alone);
   w.add("gap", t.gap, gap_signals);
   w.add("gap_noise", t.gap_noise, gap_signals);
   w.add("gap_closes", t.gap_closes, gap_signals);
@@ -95,6 +96,7 @@ Truth read_truth(const json& j) {
   t.depends_on = j.value("depends_on", Words{});
   t.nearest_equal = j.value("nearest_equal", "");
   t.equals = j.value("equals", t.nearest_equal.empty() ? Words{} : Words{t.nearest_equal});
+  t.alone = j.value("alone", "");
   t.gap = j.value("gap", Numbers{});
   t.gap_noise = j.value("gap_noise", Numbers{});
   t.gap_closes = j.value("gap_closes", Numbers{});

@@ -75,12 +75,14 @@ class Oracle {
     for (const Effect& rival : effects()) {
       if (!rival.catalogued || hidden(rival.id)) continue;
       double nearest = 1e300;
-      // Of two hidden effects one stays as it is and the other is swapped for the rival.
+      // Of two hidden effects one stays as it is and the other is swapped for the rival. (Beside one that is all by itself anything is as good.)
       if (d_.hidings.size() == 1)
         nearest = nearest_of(rival, kNoneKept, random);
       else
         for (std::size_t kept = 0; kept < d_.hidings.size(); ++kept)
-          nearest = std::min(nearest, nearest_of(rival, kept, random));
+          if (v.alone.at(d_.hidings[kept].effect->id) >= kNear)
+            nearest = std::min(nearest, nearest_of(rival, kept, random));
+      if (nearest == 1e300) continue;  // nobody can know that there are two
       v.rivals[rival.id] = nearest;
       if (nearest < kNear) v.equals.push_back(rival.id);
     }

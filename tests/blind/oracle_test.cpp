@@ -56,6 +56,10 @@ TEST(Oracle, of_two_effects_says_what_either_leaves_by_itself) {
   EXPECT_NEAR(std::hypot(v.alone.at("leak"), v.alone.at("coulomb_friction")), v.none, 0.05 * v.none);
   EXPECT_GT(v.alone.at("leak"), 10.0);
   EXPECT_GT(v.alone.at("coulomb_friction"), 10.0);
+  // An added inertia and a gain of the encoder are one equation: by itself either is all, and beside it any rival would do.
+  const Verdict one = judge(make_dataset({.seed = 4, .ids = {"inertia_error", "encoder_gain"}}));
+  EXPECT_LT(std::min(one.alone.at("inertia_error"), one.alone.at("encoder_gain")), 3.0);
+  for (const std::string& id : one.equals) EXPECT_NE(id, "mains_hum");
   // Of one there is nothing to be left.
   EXPECT_TRUE(judge(make_dataset({.seed = 2, .ids = {"torque_offset"}})).alone.empty());
 }

@@ -51,6 +51,9 @@ Truth read_truth(const json& label) {
       nearest = sigma.get<double>();
       t.nearest_equal = id;
     }
+    if (oracle.contains("alone"))
+      for (const auto& [id, sigma] : oracle["alone"].items())
+        if (sigma.is_number() && sigma.get<double>() < 3.0) t.alone = id;
   }
   return t;
 }
@@ -200,7 +203,9 @@ Judgement judge_case(const Case& one) {
     j.all_named = holds(a.effects, t.ids[0]) && holds(a.effects, t.ids[1]);
     j.one_named = holds(a.effects, t.ids[0]) != holds(a.effects, t.ids[1]);
     j.in_set = holds(set, t.ids[0]) && holds(set, t.ids[1]);
-    j.both_told = t.nearest_equal.empty() ? j.all_named : j.in_set && holds(set, t.nearest_equal);
+    j.both_told = t.nearest_equal.empty() && t.alone.empty()
+                      ? j.all_named
+                      : j.in_set && (t.nearest_equal.empty() || holds(set, t.nearest_equal));
   }
   if (t.kind == "unknown") {
     const bool all = std::all_of(t.depends_on.begin(), t.depends_on.end(),

@@ -2,7 +2,8 @@
 /// Holds answers of isac-explain against the labels and counts.
 ///
 /// Where the oracle says that a rival is less than three sigma from the truth, an answer is right when its set (effects
-/// and alternatives) holds the truth and the nearest rival; a single name earns nothing there.
+/// and alternatives) holds the truth and the nearest rival; a single name earns nothing there. Of two hidden effects of which one
+/// alone is less than three sigma from both, the set that holds both.
 #pragma once
 
 #include <map>
@@ -19,6 +20,7 @@ struct Truth {
   std::vector<std::string> ids, subsystems, depends_on;
   std::string nearest_equal;        ///< the nearest rival below three sigma, or empty
   std::vector<std::string> equals;  ///< all of them
+  std::string alone;                ///< of two hidden the one that is below three sigma by itself, or empty
   /// Per signal (torque, driven, pressure, p1, p2, balance): gap that the true model closes on held-out runs, the noise left, and the mean
   /// square that it takes out of these very recordings.
   std::map<std::string, double> gap, gap_noise, gap_closes;
@@ -57,9 +59,11 @@ struct Judgement {
   bool first = false, first_three = false, in_set = false;
   bool single_wrong = false;  ///< one name, wrong, and nothing says that it might be
   bool all_named = false;     ///< of two hidden effects both
-  bool both_told = false;     ///< the same; where a rival is below three sigma, a set of both and the rival
-  bool one_named = false;     ///< of two hidden effects just one
-  bool asserted = false;      ///< named, and nothing beside it says that it might be another
+  bool both_told =
+      false;  ///< the same; where a rival is below three sigma, a set of both and the rival; where one
+              ///< of the two is below three sigma by itself, a set of both
+  bool one_named = false;  ///< of two hidden effects just one
+  bool asserted = false;   ///< named, and nothing beside it says that it might be another
   bool tied =
       false;  ///< asserted under the name of a rival below three sigma of what was left out: nobody can know
   bool left_unnamed = false, right_variables = false;

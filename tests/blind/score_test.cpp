@@ -102,6 +102,15 @@ TEST(Score, wants_both_of_two_effects) {
   EXPECT_TRUE(judge_case(one).both_told);
   one.answer = named({"leak", "creep"});
   EXPECT_FALSE(judge_case(one).both_told);
+  // Where one of them is all that anybody can see, the set of both.
+  one.truth.nearest_equal.clear();
+  one.truth.alone = "leak";
+  EXPECT_TRUE(judge_case(one).both_told);
+  one.answer = named({"leak"}, {"creep"});
+  EXPECT_TRUE(judge_case(one).both_told);
+  EXPECT_FALSE(judge_case(one).all_named);
+  one.answer = named({"leak"});
+  EXPECT_FALSE(judge_case(one).both_told);
 }
 
 TEST(Score, measures_the_closed_gap_against_what_the_true_model_closes) {
