@@ -19,6 +19,7 @@ constexpr double kNear = 3.0;        // sigma
 constexpr double kWorthMoving =
     0.5;  // of what is there without it: what is farther by sums of small responses is not simulated anew
 constexpr int kMoves = 6;
+constexpr double kNudge = 0.02, kFarthest = 3;  // of a shape's value, and so many of them at a time
 
 class Oracle {
  public:
@@ -38,8 +39,10 @@ class Oracle {
     for (std::size_t k = 0; k < truth_.size(); ++k) truth_[k] -= plain[k];
     sensitivities();
     fit_ = LeastSquares(base_, truth_);
-    for (const Hiding& hiding : d.hidings)
+    for (const Hiding& hiding : d.hidings) {
       true_columns_.push_back(response(*hiding.effect, hiding.amplitude, hiding.shape));
+      if (d.hidings.size() > 1) slopes_.push_back(slopes_of(hiding, true_columns_.back()));
+    }
   }
 
   /// Only the noise model is wanted of this one.
@@ -70,7 +73,7 @@ class Oracle {
     v.self = fit_.distance(truth);
     if (d_.hidings.size() > 1)
       for (std::size_t kept = 0; kept < d_.hidings.size(); ++kept)
-        v.alone[d_.hidings[kept].effect->id] = fit_.distance({&true_columns_[kept]});
+        v.alone[d_.hidings[kept].effect->id] = fit_.distance(kept_columns(kept));
     Random random(d_.request.seed ^ 0xa0761d6478bd642full);
     for (const Effect& rival : effects()) {
       if (!rival.catalogued || hidden(rival.id)) continue;
@@ -98,6 +101,38 @@ class Oracle {
   }
 
   using Column = std::vector<double>;
+
+  /// How the response of a hidden effect changes with one value of its shape.
+  struct Slope {
+    std::string name;
+    double change;  ///< of the value, for which the column stands
+    Column column;
+  };
+
+  /// Beside a rival of the other, an effect that stays need not keep its place: a muscle goes slack at another angle beside a gain of the
+  /// encoder. (A line's frequency is no matter of a slope.)
+  [[nodiscard]] std::vector<Slope> slopes_of(const Hiding& hiding, const Column& here) {
+    std::vector<Slope> slopes;
+    for (const auto& [name, value] : hiding.shape) {
+      const bool angle = name == "phi0" || name == "psi";
+      if (name == "sign" || name == "sensor" || name == "of_B" || name == "side" || name == "N" ||
+          name == "t" || name == "f")
+        continue;
+      const double change = angle ? 0.05 : kNudge * value;
+      Shape moved = hiding.shape;
+      moved[name] += change;
+      Column column = response(*hiding.effect, hiding.amplitude, moved);
+      for (std::size_t k = 0; k < column.size(); ++k) column[k] -= here[k];
+      slopes.push_back({name, change, std::move(column)});
+    }
+    return slopes;
+  }
+
+  [[nodiscard]] std::vector<const Column*> kept_columns(std::size_t kept) const {
+    std::vector<const Column*> columns = {&true_columns_[kept]};
+    for (const Slope& slope : slopes_[kept]) columns.push_back(&slope.column);
+    return columns;
+  }
 
   [[nodiscard]] bool hidden(const std::string& id) const {
     return std::any_of(d_.hidings.begin(), d_.hidings.end(),
@@ -372,18 +407,20 @@ class Oracle {
   /// With the base parameters moved in the simulation as well. A free joint goes elsewhere with another inertia or stiffness, so that there
   /// the responses of both are no sum: an added inertia and a gain of the encoder are the same equation, and were 5 to 20 sigma apart as sums.
   [[nodiscard]] double moved(const Effect& rival, const Try& near, std::size_t kept) const {
-    Hidden kept_part;
-    kept_part.seed = d_.request.seed;
+    Hiding stays;
+    std::vector<const Column*> columns = {&near.column};
     if (kept != kNoneKept) {
-      const Hiding& h = d_.hidings[kept];
-      h.effect->apply(kept_part, h.amplitude, h.shape);
+      stays = d_.hidings[kept];
+      for (const Column* column : kept_columns(kept)) columns.push_back(column);
     }
     Rig rig = d_.rig;
     std::vector<RunPlan> plans;
     for (const Still& still : still_) plans.push_back(d_.runs[still.run]);
     double nearest = near.sigma, amplitude = near.amplitude;
     for (int move = 0; move <= kMoves; ++move) {
-      Hidden hidden = kept_part;
+      Hidden hidden;
+      hidden.seed = d_.request.seed;
+      if (kept != kNoneKept) stays.effect->apply(hidden, stays.amplitude, stays.shape);
       rival.apply(hidden, amplitude, near.shape);
       Column left = truth_;
       std::size_t k = 0;
@@ -404,7 +441,7 @@ class Oracle {
       const double sigma = std::sqrt(sum);
       nearest = std::min(nearest, sigma);
       std::vector<double> weights, base;
-      LeastSquares(base_, left).distance({&near.column}, &weights, &base);
+      LeastSquares(base_, left).distance(columns, &weights, &base);
       rig.A += base[0] / (rig.r * rig.r);
       rig.B += 2.0 * base[1] / rig.r;
       rig.C -= base[2];
@@ -412,13 +449,19 @@ class Oracle {
       rig.K_C += base[4];
       rig.T_C *= std::exp(2.0 * base[5] / rig.K_C);
       amplitude = std::clamp(amplitude + weights[0] * near.amplitude, rival.typical * 1e-3, rival.largest);
+      if (kept == kNoneKept) continue;
+      stays.amplitude *= 1.0 + std::clamp(weights[1], -0.5, 0.5);
+      for (std::size_t i = 0; i < slopes_[kept].size(); ++i) {
+        const Slope& slope = slopes_[kept][i];
+        stays.shape[slope.name] += slope.change * std::clamp(weights[2 + i], -kFarthest, kFarthest);
+      }
     }
     return nearest;
   }
 
   double nearest_of(const Effect& rival, std::size_t kept, Random& random) {
     std::vector<const Column*> fixed;
-    if (kept != kNoneKept) fixed.push_back(&true_columns_[kept]);
+    if (kept != kNoneKept) fixed = kept_columns(kept);
     const double alone = fit_.distance(fixed);
     const auto [by_sums, nearest] = nearest_by_sums(rival, fixed, alone, random);
     if (by_sums < kNear || by_sums > kWorthMoving * alone) return by_sums;
@@ -469,6 +512,7 @@ class Oracle {
   Column truth_;
   LeastSquares fit_;
   std::vector<Column> base_, true_columns_;
+  std::vector<std::vector<Slope>> slopes_;  ///< of each of two hidden effects
 };
 
 }  // namespace

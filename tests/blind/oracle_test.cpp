@@ -60,6 +60,11 @@ TEST(Oracle, of_two_effects_says_what_either_leaves_by_itself) {
   const Verdict one = judge(make_dataset({.seed = 4, .ids = {"inertia_error", "encoder_gain"}}));
   EXPECT_LT(std::min(one.alone.at("inertia_error"), one.alone.at("encoder_gain")), 3.0);
   for (const std::string& id : one.equals) EXPECT_NE(id, "mains_hum");
+  // A joint's end is met at another angle beside the other name of a gain of the encoder: what stays may move.
+  const Verdict stop =
+      judge(make_dataset({.seed = 11, .ids = {"encoder_gain", "end_stop"}, .noise = "coloured"}));
+  EXPECT_LT(stop.rivals.at("inertia_error"), 3.0);
+  EXPECT_GT(stop.rivals.at("bearing_friction"), 10.0);
   // Of one there is nothing to be left.
   EXPECT_TRUE(judge(make_dataset({.seed = 2, .ids = {"torque_offset"}})).alone.empty());
 }
