@@ -52,6 +52,29 @@ Candidate candidate_of(const Library& library, const Trial& trial, double confid
   return c;
 }
 
+/// What its own numbers say may be something simpler: the simple case of it stays in the set up to three sigma behind.
+void keep_simple_case(const Library& library, std::vector<Trial> trials, std::size_t added, Explanation& e) {
+  constexpr double kThreeSigma = 3;
+  const auto id_of = [&](const Trial& t) {
+    return library.hypotheses[static_cast<std::size_t>(t.hypothesis)].id();
+  };
+  const std::string general = id_of(trials.front());
+  std::vector<std::string> kept;
+  for (Trial& t : trials)
+    if (!t.in_set && nests(general, id_of(t)) && t.behind.t < kThreeSigma) {
+      t.in_set = true;
+      kept.push_back(id_of(t));
+    }
+  if (kept.empty()) return;
+  Ranking::weigh(trials);
+  e.effects[added].confidence = trials.front().weight;
+  for (const Trial& t : trials)
+    if (std::find(kept.begin(), kept.end(), id_of(t)) != kept.end()) {
+      std::erase_if(e.rejected, [&](const Candidate& c) { return c.id == id_of(t); });
+      e.alternatives.push_back(candidate_of(library, t, t.weight));
+    }
+}
+
 void check_terms(const BaselineModel& baseline) {
   for (const std::string& term : baseline.terms)
     if (models::find_effect(term) < 0)
@@ -313,10 +336,14 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     doubt_what_is_left(predictor, library, proof, options, found);
     numbers = uncertainties(predictor, found.model, found.weights);
-    for (std::size_t i = 0; i < found.added.size(); ++i)
-      for (std::string& why : doubts_of_numbers(
-               library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]))
-        found.doubts.push_back(std::move(why));
+    for (std::size_t i = 0; i < found.added.size(); ++i) {
+      std::vector<std::string> doubts = doubts_of_numbers(
+          library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]);
+      if (!doubts.empty()) keep_simple_case(library, found.steps[i].trials, i, e);
+      for (std::string& why : doubts) found.doubts.push_back(std::move(why));
+    }
+    if (std::string why = told_by_one_run(predictor, proof, found); !why.empty())
+      found.doubts.push_back(std::move(why));
     if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before && found.steps.front().units < kFew)
       found.doubts.push_back(
           fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "

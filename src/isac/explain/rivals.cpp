@@ -8,6 +8,7 @@
 #include "isac/explain/labels.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/search_run.hpp"
+#include "isac/explain/slip_moment.hpp"
 #include "isac/explain/workers.hpp"
 
 namespace isac::explain {
@@ -33,11 +34,15 @@ bool Search::another_leaves_nothing(const Step& step) {
     if (!cannot_rule_out(trials[i].behind) && !nests(ranking_.id_of(trials[i]), first)) continue;
     if (!ranking_.share_readings(trials[i], trials.front())) continue;
     ++tried;
-    found_.added.back() = trials[i].hypothesis;
-    move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
-    // (Where that second name is the rival itself, the first may only take up what its equation leaves.)
+    // (Where that second name is the rival itself, the first may only take up what its equation leaves; of a slip, its moment is the second's.)
     const bool itself =
         !step.trials.empty() && ranking_.id_of(step.trials.front()) == ranking_.id_of(trials[i]);
+    if (itself && is_slip(*active_of(trials[i]).hypothesis)) {
+      trials[i].values = step.trials.front().values;
+      trials[i].hypothesis = step.trials.front().hypothesis;
+    }
+    found_.added.back() = trials[i].hypothesis;
+    move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
     if (!itself && place_.residual.squaredNorm() > together) continue;
     const double large = kSmallRemainder * trials[i].material;
     asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
@@ -48,6 +53,10 @@ bool Search::another_leaves_nothing(const Step& step) {
     if (is_open_at_least(rest, large)) continue;
     rest = refitted(std::move(rest));
     if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
+    if (itself) {  // held against the others at that moment
+      trials[i].residual = place_.residual;
+      trials[i].loss = place_.residual.squaredNorm();
+    }
     say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
     put_first(i);
     found_.steps.push_back(std::move(rest));

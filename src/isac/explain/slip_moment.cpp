@@ -206,4 +206,23 @@ std::string slip_instead(const Predictor& predictor, const Library& library, con
   return moment.empty() ? told : told + " " + moment;
 }
 
+std::string told_by_one_run(const Predictor& predictor, const Proof& proof, const Found& found) {
+  const std::size_t slip = slip_of(found);
+  if (slip == found.model.model.effects.size()) return "";
+  const double at = found.model.model.effects[slip].values[kSlipMoment];
+  int before = 0, after = 0;
+  bool within = false;
+  const auto count = [&](double begin, double end) {
+    within = within || (begin < at && at < end);
+    ++(end <= at ? before : after);
+  };
+  for (const PreparedRun& run : predictor.data().runs)
+    if (!run.time.empty()) count(run.day_offset + run.time.front(), run.day_offset + run.time.back());
+  for (const Proof::Span& run : proof.spans()) count(run.begin, run.end);
+  if (within || std::min(before, after) != 1) return "";
+  return fmt::format(
+      "Only one run was recorded {} it: whatever that run shows by itself would look like a slip.",
+      before == 1 ? "before" : "after");
+}
+
 }  // namespace isac::explain

@@ -36,4 +36,8 @@ void place_slip(Library& library, const Prepared& data, const Eigen::VectorXd& r
 [[nodiscard]] std::string slip_instead(const Predictor& predictor, const Library& library, const Proof& proof,
                                        Found& found);
 
+/// Where a named slip lies between two runs and only one run was recorded before it, or after: whatever that run shows by itself looks like a
+/// slip. A sentence; else empty.
+[[nodiscard]] std::string told_by_one_run(const Predictor& predictor, const Proof& proof, const Found& found);
+
 }  // namespace isac::explain
