@@ -53,12 +53,11 @@ bool Search::another_leaves_nothing(const Step& step) {
     if (is_open_at_least(rest, large)) continue;
     rest = refitted(std::move(rest));
     if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
-    if (itself) {  // held against the others at that moment
-      trials[i].residual = place_.residual;
-      trials[i].loss = place_.residual.squaredNorm();
-    }
     say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
+    const bool moved = itself && is_slip(*active_of(trials[i]).hypothesis);
+    const Eigen::VectorXd left_by_first = trials.front().residual;
     put_first(i);
+    if (moved) leave_out_twins_of(left_by_first);
     found_.steps.push_back(std::move(rest));
     found_.adequate = true;
     return true;
@@ -68,6 +67,15 @@ bool Search::another_leaves_nothing(const Step& step) {
   cut_blocks(data_, blocks);
   move_to(kept);
   return false;
+}
+
+void Search::leave_out_twins_of(const Eigen::VectorXd& residual) {
+  std::vector<Trial>& trials = found_.steps.front().trials;
+  const NoiseDensity noise = noise_density(data_, residual);
+  for (Trial& t : trials)
+    if (&t != &trials.front() && compare(data_, residual, t.residual, 0, noise).separation < kTwinLimit)
+      t.in_set = false;
+  Ranking::weigh(trials);
 }
 
 bool Search::closes_all_that_is_left(const Step& step) {

@@ -181,6 +181,8 @@ class Search {
   // What may take an effect's place: rivals.cpp.
   /// The effect that stood first leaves something over: one of its rivals that leaves nothing takes its place.
   bool another_leaves_nothing(const Step& step);
+  /// Where a slip took the place of an offset at a moment that only told beside it: what is the same as that offset leaves the same over.
+  void leave_out_twins_of(const Eigen::VectorXd& residual);
   /// The effect that stood first leaves too little for a second name and too much for none: one of its rivals, which fitted nearly as well
   /// alone, may fit better with that second one, and leave it larger. It takes the place of the first.
   bool a_rival_goes_better_with(const Step& step);
