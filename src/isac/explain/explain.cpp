@@ -241,8 +241,13 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       options.progress(unseen ? "the torque of free runs is further off than that of others: it is fitted too"
                               : "the force sensors' zero wanders: free runs tell it beside their motion");
     add_torque_of_free_runs(data);
+    const std::unique_ptr<Library> before = std::move(library_here);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
     predictor_here = std::make_unique<Predictor>(data, options.threads);
+    if (!found.hid_the_zero.empty() && same_hypotheses(*before, *library_here)) {
+      first.colour_beside_best = true;
+      first.found = std::move(found.hid_the_zero);
+    }
     found = search(*predictor_here, *library_here, data, options, first);
   }
   // What a valve does besides its lag stood in the torque as if it were half noise: with the effect known, once more.
