@@ -15,7 +15,7 @@ namespace {
 // data lie between the two, it leads by s/2: with less than three they are twins.
 constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 constexpr double kHardlyMore = 1.25;  // of the friction in motion: at rest it is nearly the same
-constexpr double kAlike = 0.1;        // of the larger: two sensors err by the same
+constexpr double kErrAlike = 0.1;     // of the larger: two sensors err by the same
 constexpr double kCoincidence = 3;    // sigma: as seldom do two sensors err by the same
 constexpr double kLimitReach =
     8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
@@ -75,7 +75,7 @@ bool Ranking::err_alike(const Trial& t) const {
     return false;
   const double a = t.values[0] - h.info().parameters[0].null_value,
                b = t.values[1] - h.info().parameters[1].null_value;
-  return std::abs(a - b) < kAlike * std::max(std::abs(a), std::abs(b));
+  return std::abs(a - b) < kErrAlike * std::max(std::abs(a), std::abs(b));
 }
 
 bool Ranking::is_one_cause_of_both(const Trial& t, const Trial& both) const {
