@@ -4,7 +4,7 @@
 ///
 /// Everything is free of noise. The truth's residuals against the base model are fitted by the sensitivities of the base
 /// parameters and the rival's response (simulated, its amplitude and shape sought); what remains, whitened by the known
-/// noise, has the norm that is reported. Channels: torque at 100 Hz (driven and clamped runs), both pressures at 100 Hz,
+/// noise, has the norm that is reported. Of two hidden effects one stays, its size and shape free, while the other is swapped. Channels: torque at 100 Hz (driven and clamped runs), both pressures at 100 Hz,
 /// and in free runs at 20 Hz the balance torque − I φ̈ and the motion I φ̈ against the base model. Their noises are taken
 /// as independent of each other; the colour within each is white plus one Ornstein-Uhlenbeck process, taken out by the
 /// innovations of its Kalman filter.

@@ -37,12 +37,10 @@ bool Search::another_leaves_nothing(const Step& step) {
     // (Where that second name is the rival itself, the first may only take up what its equation leaves; of a slip, its moment is the second's.)
     const bool itself =
         !step.trials.empty() && ranking_.id_of(step.trials.front()) == ranking_.id_of(trials[i]);
-    if (itself && is_slip(*active_of(trials[i]).hypothesis)) {
-      trials[i].values = step.trials.front().values;
-      trials[i].hypothesis = step.trials.front().hypothesis;
-    }
-    found_.added.back() = trials[i].hypothesis;
-    move_to(refit(predictor_, found_.baseline, {active_of(trials[i])}, found_.weights, 6));
+    const bool moved = itself && is_slip(*active_of(step.trials.front()).hypothesis);
+    const Active rival = active_of(moved ? step.trials.front() : trials[i]);
+    found_.added.back() = moved ? step.trials.front().hypothesis : trials[i].hypothesis;
+    move_to(refit(predictor_, found_.baseline, {rival}, found_.weights, 6));
     if (!itself && place_.residual.squaredNorm() > together) continue;
     const double large = kSmallRemainder * trials[i].material;
     asked_for_.emplace();  // functions without a name, which cost next to nothing, often say it already
@@ -54,7 +52,10 @@ bool Search::another_leaves_nothing(const Step& step) {
     rest = refitted(std::move(rest));
     if (rest.gate.significant && rest.gate.material && rest.gate.size >= large) continue;
     say(fmt::format("{} leaves nothing, {} does: it takes its place", ranking_.id_of(trials[i]), first));
-    const bool moved = itself && is_slip(*active_of(trials[i]).hypothesis);
+    if (moved) {
+      trials[i].hypothesis = step.trials.front().hypothesis;
+      trials[i].values = step.trials.front().values;
+    }
     const Eigen::VectorXd left_by_first = trials.front().residual;
     put_first(i);
     if (moved) leave_out_twins_of(left_by_first);

@@ -146,11 +146,11 @@ class Search {
   /// Linear responses let runs at rest stand where they will; within a step of the encoder, as a joint refit has them, they may tell when it
   /// slipped.
   void choose_moment(Step& step) const;
-  /// Where a force's reading is clipped, or something added begins at a place that is fitted (a slack muscle's angle), rows of the torque are not
-  /// linear in what was fitted, and off which they were projected holds nearby only: a rival that moves it far (a gain of the encoder for an added
-  /// inertia) is refitted with it before it is ruled out. Those further behind than this, in sigma, are left.
+  /// Rows are projected off the slopes of what was fitted, which hold nearby only where a force's reading is clipped, or where something added has a
+  /// shape that was fitted (a slack muscle's angle): a rival that moves it far (a gain of the encoder for an added inertia) is refitted with all of
+  /// it before it is ruled out. Those further behind than this, in sigma, are left.
   void fit_with_the_baseline(std::vector<Trial>& trials, double nearer_than) const;
-  bool bends_in_the_angle() const;
+  bool a_shape_was_fitted() const;
   /// What it leaves of this place with its amplitude alone told by the data, not the states that its refit read off them.
   Eigen::VectorXd left_as_known_beforehand(const Trial& t) const;
   Trial refit_one(const Screened& candidate) const;

@@ -22,7 +22,7 @@ constexpr double kMinimumBlocks = 24;
 constexpr double kWorthALook = 0.5;    // of what is material: a refit may be larger than the linear response
 constexpr double kKeptPromise = 0.1;   // of the linear gain
 constexpr double kNearlyAsWell = 0.6;  // of the gain: another moment of a slip
-constexpr double kFewSigma = 15;       // that a place in the shape of what was added may be worth
+constexpr double kFewSigma = 15;       // that moving what was added may bring a rival nearer by
 constexpr double kNear = 0.7, kFarUnits = 400;  // of the best gain, and units of noise
 
 }  // namespace
@@ -310,7 +310,7 @@ std::vector<Trial> Search::refit_all(const std::vector<Screened>& list) const {
   return trials;
 }
 
-bool Search::bends_in_the_angle() const {
+bool Search::a_shape_was_fitted() const {
   return std::any_of(found_.added.begin(), found_.added.end(), [&](int added) {
     const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(added)];
     return (h.chains & kForceChains) != 0 &&
@@ -364,7 +364,7 @@ Step Search::refitted(Step step) {
   ranking_.rank(step.trials, place_.residual);
   if (clips_force(found_.model.model))
     fit_with_the_baseline(step.trials, std::numeric_limits<double>::infinity());
-  else if (bends_in_the_angle())
+  else if (a_shape_was_fitted())
     fit_with_the_baseline(step.trials, kFewSigma);
   choose_moment(step);
   if (found_.added.empty()) put_material_first(step);
