@@ -103,9 +103,13 @@ void Search::doubt_the_clock() {
 
 double Search::offset_within_a_step(const Step& step) const {
   if (found_.added.empty()) return 0;
+  // What was added may hold an offset of its own, and stand for some of the reading's or against it until that is free: it may look twice as large.
+  const bool shared = std::any_of(found_.added.begin(), found_.added.end(), [&](int added) {
+    return nests(library_.hypotheses[static_cast<std::size_t>(added)].id(), "torque_offset");
+  });
+  const double most = (shared ? 1.0 : 0.5) * data_.rig.angle_step;
   for (const Trial& t : step.trials)
-    if (t.in_set && ranking_.id_of(t) == "encoder_offset" &&
-        std::abs(t.values[0]) < 0.5 * data_.rig.angle_step)
+    if (t.in_set && ranking_.id_of(t) == "encoder_offset" && std::abs(t.values[0]) < most)
       return t.values[0] / data_.rig.angle_step;
   return 0;
 }

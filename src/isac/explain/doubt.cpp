@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "isac/core/units.hpp"
@@ -18,6 +19,16 @@
 
 namespace isac::explain {
 namespace {
+
+constexpr int kRefitIterations = 8;
+
+/// The chain in which two fits of the same rows differ most, over the floor.
+Chain shows_most_in(const Predictor& predictor, const Found& found, const Fit& with, const Fit& without) {
+  Chain chain = Chain::kTorque;
+  (void)size_over_floor(predictor.data(), found.weights, found.floors, with.residual - without.residual,
+                        &chain);
+  return chain;
+}
 
 constexpr double kNoneOfThem =
     0.08;  // of the belief, where a name leaves over what chance seldom does: explain.md
@@ -104,28 +115,79 @@ bool is_refuted(const Predictor& predictor, Found& found, const ModelPoint& user
          !is_mended_by_raw_effects(predictor, found, proof, chain, options, gap);
 }
 
+namespace {
+
+/// Of a step's trials the one that held-out runs bear, of those hardly behind the name that they refute; its fit beside the others. The trials
+/// that they refute too are left out of the set.
+std::optional<Fit> borne_instead(const Predictor& predictor, const Library& library,
+                                 const std::vector<Active>& others, const Found& found, const Proof& proof,
+                                 const Fit& without, std::vector<Trial>& trials) {
+  constexpr double kHardlyBehind = 3.0;  // sigma
+  std::optional<Fit> first;
+  std::vector<Trial> borne, ruled_out;
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const Trial& t = trials[i];
+    if (i == 0 || !(t.behind.t < kHardlyBehind)) {
+      ruled_out.push_back(t);
+      continue;
+    }
+    std::vector<Active> all = others;
+    all.push_back({&library.hypotheses[static_cast<std::size_t>(t.hypothesis)], t.values});
+    Fit fit = refit(predictor, found.baseline, all, found.weights, kRefitIterations);
+    const Chain chain = shows_most_in(predictor, found, fit, without);
+    const bool bears = proof.residual(fit.model, chain).rms() <= proof.residual(without.model, chain).rms() ||
+                       proof.freed(fit.model, without.model, found.weights, chain).behind.t >= kSetLimit;
+    (bears ? borne : ruled_out).push_back(t);
+    if (bears && !first) first = std::move(fit);
+  }
+  if (!first) return first;
+  trials = std::move(borne);
+  const Ranking ranking(predictor.data(), library);
+  ranking.mark(trials);
+  Ranking::weigh(trials);
+  for (Trial& t : ruled_out) {
+    t.in_set = false;
+    t.weight = 0;
+    trials.push_back(std::move(t));
+  }
+  return first;
+}
+
+}  // namespace
+
 void take_away_what_is_refuted(const Predictor& predictor, const Library& library, const Proof& proof,
                                Found& found) {
   constexpr double kWorse = 1.02;
-  constexpr int kIterations = 8;
   if (proof.runs() == 0) return;
   for (std::size_t k = found.added.size(); k-- > 0 && found.added.size() > 1;) {
     std::vector<Active> others;
     for (std::size_t i = 0; i < found.added.size(); ++i)
       if (i != k) others.push_back(found.model.model.effects[found.model.tolerances + i]);
-    Fit without = refit(predictor, found.baseline, others, found.weights, kIterations);
-    Chain chain = Chain::kTorque;
-    (void)size_over_floor(predictor.data(), found.weights, found.floors,
-                          found.model.residual - without.residual, &chain);
+    Fit without = refit(predictor, found.baseline, others, found.weights, kRefitIterations);
+    const Chain chain = shows_most_in(predictor, found, found.model, without);
     const auto rms = [&](const Fit& fit) { return proof.residual(fit.model, chain).rms(); };
     const double t = proof.freed(found.model.model, without.model, found.weights, chain).behind.t;
     if (!(rms(found.model) > kWorse * rms(without)) || t >= kSetLimit) continue;
+    const char* term = library.hypotheses[static_cast<std::size_t>(found.added[k])].info().term;
+    if (std::optional<Fit> fit =
+            borne_instead(predictor, library, others, found, proof, without, found.steps[k].trials)) {
+      const int instead = found.steps[k].trials.front().hypothesis;
+      found.notes.push_back({library.hypotheses[static_cast<std::size_t>(found.added[k])].id(),
+                             fmt::format("ruled out: the held-out runs refute it, and bear {}",
+                                         library.hypotheses[static_cast<std::size_t>(instead)].id())});
+      // The one that was taken is fitted last: it stands where the other stood.
+      std::vector<Active> all = others;
+      all.insert(all.begin() + static_cast<std::ptrdiff_t>(k), fit->model.effects.back());
+      found.model = polished(
+          predictor, refit(predictor, found.baseline, all, found.weights, kRefitIterations), found.weights);
+      found.added[k] = instead;
+      continue;
+    }
     found.doubts.push_back(
         fmt::format("Something more is missing on the fitted runs (p = {:.1g}), most like {}; the held-out "
                     "runs refute that "
                     "name.",
-                    found.steps[k].gate.p_value,
-                    library.hypotheses[static_cast<std::size_t>(found.added[k])].info().term));
+                    found.steps[k].gate.p_value, term));
     found.model = polished(predictor, std::move(without), found.weights);
     found.added.erase(found.added.begin() + static_cast<std::ptrdiff_t>(k));
     found.steps.erase(found.steps.begin() + static_cast<std::ptrdiff_t>(k));

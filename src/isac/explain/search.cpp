@@ -151,7 +151,10 @@ void Search::forward() {
                            step.gate.size));
     report(step.trials);
     found_.adequate = !open;
-    if (!open && no_zero_wanders_beside_it()) continue;
+    if (!open && (no_zero_wanders_beside_it() || slow_noise_hid_another(step))) {
+      if (found_.wants_torque_of_free_runs) return;
+      continue;
+    }
     if (open && found_.added.empty() && is_convention(step)) continue;
     if (open && found_.added.size() < 2 && a_wandering_zero_was_hidden_by(step)) {
       if (found_.wants_torque_of_free_runs) return;

@@ -122,6 +122,9 @@ class Search {
   /// And what is missing may look like such a zero where the runs, or the levels within one, differ by it: beside what was found it is none, and the
   /// search begins anew with a zero that stands still.
   bool no_zero_wanders_beside_it();
+  /// What is slow and still missing beside a first effect passes for slow noise, which takes from its rows and spoils its blocks: as where nothing
+  /// was added yet (screen_here), what is large and not found has the noise's colour read off once more beside it.
+  bool slow_noise_hid_another(const Step& step);
   /// The search forgets what it added. Once only.
   void begin_anew_with_noise_of(const Eigen::VectorXd& rows);
   /// Everything is fitted anew beside the noise's slow part, read off what is left over (r/σ).

@@ -88,6 +88,24 @@ bool Search::no_zero_wanders_beside_it() {
   return true;
 }
 
+bool Search::slow_noise_hid_another(const Step& step) {
+  const Screen& s = step.screen;
+  if (colour_beside_best_ || found_.added.empty() || !look_.settled.empty() || step.gate.significant ||
+      s.candidates.empty())
+    return false;
+  const Screened& most = s.candidates.front();
+  if (is_significant(most, s) || most.gain < kLargeForSure * s.noise_unit) return false;
+  const Trial hidden = refit_one(most);
+  if (hidden.material < options_.material || units_closed(hidden) < kLargeForSure || is_implausible(hidden))
+    return false;
+  say(fmt::format(
+      "{} would close {:.0f} units of noise in too few blocks to tell: once more beside the noise "
+      "that it leaves",
+      ranking_.id_of(hidden), units_closed(hidden)));
+  begin_anew_with_noise_of(unfiltered(data_, found_.weights, hidden.residual));
+  return true;
+}
+
 void Search::begin_anew_with_noise_of(const Eigen::VectorXd& rows) {
   colour_beside_best_ = true;
   found_.added.clear();
