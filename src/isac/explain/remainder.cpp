@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -65,34 +66,55 @@ std::string sigma_ahead(const Comparison& behind) {
   return fmt::format("{:.1f} sigma {}", std::abs(behind.t), behind.t > 0 ? "ahead" : "behind");
 }
 
-/// Of all steps between two runs the one that leaves least, tolerances come back as they do beside a name: of the torque, or of the torque and the
-/// motion, as a zero of the encoder or of the forces does that moved.
-GenericFit best_step_between_runs(const Around& place) {
+/// What a zero that moved over the day adds to a row: `shape` of it, in the torque, or in the torque and the motion alike or against it, as a zero of
+/// the encoder or of the forces does that moved. The best of these, beside which tolerances come back as they do beside a name, takes the place of
+/// `best` if it leaves less.
+void take_if_less(const Around& place, const std::function<double(const Row&)>& shape, std::size_t function,
+                  GenericFit& best) {
   const Prepared& data = place.predictor->data();
-  GenericFit best{
-      .chain = Chain::kTorque, .functions = {}, .of_reading = {}, .gain = 0, .residual = place.residual};
-  double least = place.residual.squaredNorm();
   for (const double in_motion : {0.0, 1.0, -1.0}) {
     if (in_motion != 0 && !data.has(Chain::kMotion)) continue;
-    for (std::size_t first = 1; first < data.runs.size(); ++first) {
-      Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
-      for (std::size_t i = 0; i < data.rows.size(); ++i) {
-        if (data.rows[i].run < first) continue;
-        if (data.rows[i].chain == Chain::kTorque) rows[static_cast<Eigen::Index>(i)] = 1;
-        if (data.rows[i].chain == Chain::kMotion) rows[static_cast<Eigen::Index>(i)] = in_motion;
-      }
-      weigh(data, *place.weights, rows);
-      rows = place.project(rows);
-      if (!(rows.norm() > 1e-6)) continue;
-      Eigen::VectorXd left = place.left_beside(rows);
-      const double loss = left.squaredNorm();
-      if (loss >= least) continue;
-      least = loss;
-      best.functions = {first};
-      best.residual = std::move(left);
+    Eigen::VectorXd rows = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+    for (std::size_t i = 0; i < data.rows.size(); ++i) {
+      if (data.rows[i].chain == Chain::kTorque) rows[static_cast<Eigen::Index>(i)] = shape(data.rows[i]);
+      if (data.rows[i].chain == Chain::kMotion)
+        rows[static_cast<Eigen::Index>(i)] = in_motion * shape(data.rows[i]);
     }
+    weigh(data, *place.weights, rows);
+    rows = place.project(rows);
+    if (!(rows.norm() > 1e-6)) continue;
+    Eigen::VectorXd left = place.left_beside(rows);
+    if (left.squaredNorm() >= best.residual.squaredNorm()) continue;
+    best.functions = {function};
+    best.residual = std::move(left);
   }
-  best.gain = place.residual.squaredNorm() - least;
+  best.gain = place.residual.squaredNorm() - best.residual.squaredNorm();
+}
+
+GenericFit nothing_at(const Around& place) {
+  return {.chain = Chain::kTorque, .functions = {}, .of_reading = {}, .gain = 0, .residual = place.residual};
+}
+
+/// Of all steps between two runs the one that leaves least; its function is the run before which it is.
+GenericFit best_step_between_runs(const Around& place) {
+  GenericFit best = nothing_at(place);
+  for (std::size_t first = 1; first < place.predictor->data().runs.size(); ++first)
+    take_if_less(
+        place, [&](const Row& row) { return row.run < first ? 0.0 : 1.0; }, first, best);
+  return best;
+}
+
+/// A drift that is straight over the day.
+GenericFit straight_drift(const Around& place) {
+  GenericFit best = nothing_at(place);
+  const Prepared& data = place.predictor->data();
+  constexpr double kHour = 3600;
+  take_if_less(
+      place,
+      [&](const Row& row) {
+        return (data.runs[row.run].day_offset + data.runs[row.run].time[row.sample]) / kHour;
+      },
+      0, best);
   return best;
 }
 
@@ -120,6 +142,29 @@ void Search::hold_against_a_step(const Around& baseline) {
       "sigma of data lie between).",
       data_.runs[step.functions.front()].name, std::abs(behind.t), behind.t > 0 ? "ahead" : "behind",
       behind.separation));
+}
+
+void Search::hold_against_a_drift(const Around& baseline) {
+  if (found_.added.size() != 1 || !data_.has(Chain::kTorque)) return;
+  const std::vector<Trial>& trials = found_.steps.front().trials;
+  const Trial& named = trials.front();
+  if (!is_slip(library_.hypotheses[static_cast<std::size_t>(named.hypothesis)])) return;
+  if (std::any_of(trials.begin(), trials.end(), [&](const Trial& t) {
+        const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+        return t.in_set && h.clock == Clock::kDay && !is_slip(h);
+      }))
+    return;  // told by its name
+  const GenericFit drift = straight_drift(baseline);
+  if (drift.functions.empty()) return;
+  const Comparison behind = behind_generic(data_, named.residual, ranking_.parameters_of(named), drift);
+  say(fmt::format("{}: a straight drift is {:.1f} sigma {} ({:.1f} sigma of data between them)",
+                  ranking_.id_of(named), std::abs(behind.t), behind.t > 0 ? "ahead" : "behind",
+                  behind.separation));
+  if (behind.separation >= kTwinLimit && behind.t <= kCloserThanChance - 0.5 * behind.separation) return;
+  found_.doubts.push_back(
+      fmt::format("It may have moved slowly: a drift that is straight over the day does as well, or nearly "
+                  "({:.1f} sigma {}, where {:.1f} sigma of data lie between).",
+                  std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
 }
 
 bool Search::are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of) {

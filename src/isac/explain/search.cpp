@@ -56,6 +56,7 @@ void Search::hold_against_others() {
   const Around baseline = around(predictor_, found_.baseline, found_.weights);
   hold_against_functions(baseline);
   if (found_.adequate) hold_against_a_step(baseline);
+  if (found_.adequate) hold_against_a_drift(baseline);
   if (found_.adequate) hold_against_any_valve();
   if (found_.adequate) hold_against_itself(baseline);
 }

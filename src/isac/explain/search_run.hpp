@@ -211,6 +211,8 @@ class Search {
   bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of = "");
   /// What moves with the time of the day may have happened at once, between two runs.
   void hold_against_a_step(const Around& baseline);
+  /// And what is said to have happened at once may have gone on all day, where no drift with a name says so.
+  void hold_against_a_drift(const Around& baseline);
   /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
   void hold_against_itself(const Around& baseline);
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.
