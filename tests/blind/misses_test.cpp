@@ -186,7 +186,9 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"clear", "coloured", "hysteresis", "9305", R"("alternatives":[{"id":"hysteresis")",
              "a hysteresis that differs by direction, doubted without naming the simple one"},
         Miss{"leave-one-out", "coloured", "creep", "9305", R"("verdict":"not_separable")",
-             "a slip of the encoder before the last run, which alone showed it"}));
+             "a slip of the encoder before the last run, which alone showed it"},
+        Miss{"leave-one-out", "quantised", "encoder_drift", "9306", R"("verdict":"not_separable")",
+             "a slip of the encoder, where a straight drift without a name leaves as little"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's
@@ -302,7 +304,22 @@ INSTANTIATE_TEST_SUITE_P(
                  "threshold_pressure,pressure_dependent_friction",
                  "9169226140108239330",
                  {"threshold_pressure", "pressure_dependent_friction"},
-                 "unknown, for the two together hid that the forces' zero wanders"}));
+                 "unknown, for the two together hid that the forces' zero wanders"},
+        PairMiss{"quantised",
+                 "encoder_slip,torque_ripple",
+                 "7977928559417672046",
+                 {"encoder_slip", "torque_ripple"},
+                 "a ripple alone, for the slip beside it passed for the zero's wandering"},
+        PairMiss{"quantised",
+                 "torque_offset,torque_ripple",
+                 "5098493841760972639",
+                 {"torque_offset", "torque_ripple", "encoder_offset"},
+                 "a ripple alone, for held-out runs refute the drift that the offset seemed to be"},
+        PairMiss{"quantised",
+                 "asymmetric_hysteresis,torque_ripple",
+                 "5413220735289416126",
+                 {"asymmetric_hysteresis", "torque_ripple"},
+                 "unknown, for the loop held some of the encoder's half step, which then looked too large"}));
 
 /// What isac-explain says, its words one space apart, of a clear slip in white noise; `without`: held-out runs that are not handed to it.
 std::string said_of_slip(const std::string& seed, const std::string& without = "") {
