@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "isac/explain/variable_words.hpp"
+#include "isac/explain/where.hpp"
 #include "isac/report/parameters.hpp"
 #include "isac/report/text.hpp"
 
@@ -120,9 +121,12 @@ std::string region_sentence(const explain::Region& region) {
   std::string text = subsystem_in_words(region.subsystem) + ", " + signal_in_words(region.signal);
   if (std::isfinite(region.low) && std::isfinite(region.high)) {
     const std::string unit = pretty_unit(region.unit);
-    text += ": " + explain::variable_in_words(region.variable, explain::of_linear_axis(region.unit)) +
-            " from " + number(region.low, 3) + " to " + number(region.high, 3) +
-            (unit.empty() ? "" : " " + unit);
+    if (region.variable == "direction")
+      text += ": " + explain::in_words(region);
+    else
+      text += ": " + explain::variable_in_words(region.variable, explain::of_linear_axis(region.unit)) +
+              (region.low == region.high ? " " : " from " + number(region.low, 3) + " to ") +
+              number(region.high, 3) + (unit.empty() ? "" : " " + unit);
   } else if (!region.variable.empty()) {
     text += ": " + explain::variable_in_words(region.variable, explain::of_linear_axis(region.unit));
   }
