@@ -4,8 +4,9 @@
 ///   refuted     rms_after > 1.002 rms_before on held-out runs (or 1.01 of the search's own baseline), and neither
 ///                 t ≥ 3 in rows freed of the noise's slow part, nor
 ///                 rms_after ≤ 1.01 rms_before and t > −1.645: they hardly show it, and noise decides, nor
-///                 t ≥ 3 over the search's own baseline, where what only the recording's rate shows (raw_effects.hpp) then takes so much
-///                 more that rms_after ≤ rms_before: two things are missing, and one of them was not in the rows
+///                 t ≥ 3 over the search's own baseline, or less than three sigma of the effect in these rows, where what only the recording's
+///                 rate shows (raw_effects.hpp) then takes so much more that rms_after ≤ rms_before: two things are missing, and one of them was
+///                 not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, leaves over what chance seldom does, or in a few moments what noise
 ///                 holds nowhere else, or functions without a name do as well (remainder.cpp), or its numbers speak against its name
 ///                 (number_doubts.hpp), or held-out runs, alone or with the fitted ones, leave over what chance seldom does (left_over.hpp)
