@@ -102,7 +102,8 @@ class Oracle {
 
   using Column = std::vector<double>;
 
-  /// How the response of a hidden effect changes with one value of its shape.
+  /// How the response of a hidden effect changes with one value of its shape; without a name: with the same error of the other sensor, which
+  /// the catalogue's effect has as a number of its own.
   struct Slope {
     std::string name;
     double change;  ///< of the value, for which the column stands
@@ -124,6 +125,11 @@ class Oracle {
       Column column = response(*hiding.effect, hiding.amplitude, moved);
       for (std::size_t k = 0; k < column.size(); ++k) column[k] -= here[k];
       slopes.push_back({name, change, std::move(column)});
+    }
+    if (hiding.shape.contains("sensor")) {
+      Shape other = hiding.shape;
+      other["sensor"] = 3.0 - other["sensor"];
+      slopes.push_back({"", 1.0, response(*hiding.effect, hiding.amplitude, other)});
     }
     return slopes;
   }
@@ -453,6 +459,7 @@ class Oracle {
       stays.amplitude *= 1.0 + std::clamp(weights[1], -0.5, 0.5);
       for (std::size_t i = 0; i < slopes_[kept].size(); ++i) {
         const Slope& slope = slopes_[kept][i];
+        if (slope.name.empty()) continue;
         stays.shape[slope.name] += slope.change * std::clamp(weights[2 + i], -kFarthest, kFarthest);
       }
     }

@@ -60,6 +60,10 @@ TEST(Oracle, of_two_effects_says_what_either_leaves_by_itself) {
   const Verdict one = judge(make_dataset({.seed = 4, .ids = {"inertia_error", "encoder_gain"}}));
   EXPECT_LT(std::min(one.alone.at("inertia_error"), one.alone.at("encoder_gain")), 3.0);
   for (const std::string& id : one.equals) EXPECT_NE(id, "mains_hum");
+  // Zeros of both pressure sensors are all that a valve's zero and one of one sensor are.
+  const Verdict zeros = judge(make_dataset({.seed = 4, .ids = {"pressure_offset", "pressure_gain_error"}}));
+  EXPECT_LT(zeros.alone.at("pressure_offset"), 1e-3);
+  EXPECT_GT(zeros.alone.at("pressure_gain_error"), 10.0);
   // A joint's end is met at another angle beside the other name of a gain of the encoder: what stays may move.
   const Verdict stop =
       judge(make_dataset({.seed = 11, .ids = {"encoder_gain", "end_stop"}, .noise = "coloured"}));

@@ -24,6 +24,7 @@
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
 #include "isac/explain/slip_moment.hpp"
+#include "isac/explain/two_zeros.hpp"
 #include "isac/explain/uncertainty.hpp"
 #include "isac/explain/unknown.hpp"
 #include "isac/explain/where.hpp"
@@ -375,7 +376,9 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
            std::any_of(e.alternatives.begin(), e.alternatives.end(), is) ||
            std::any_of(e.rejected.begin(), e.rejected.end(), is);
   });
+  const std::string zeros = tell_a_valves_zero(options.excluded, e);
   describe(predictor, library, found, proof, options, numbers, e);
+  if (!zeros.empty()) e.summary += " " + zeros;
   if (!moment.empty() && e.verdict != Verdict::kUnknown) e.summary += " " + moment;
   fill_heldout(predictor, plain, proof, e.signals);
   look_beyond_fitted_runs(data, found, proof, e);
