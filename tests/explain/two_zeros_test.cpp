@@ -38,7 +38,8 @@ TEST(TwoZeros, are_a_valves_zero_and_one_of_a_sensor) {
 
 TEST(TwoZeros, of_which_the_first_is_larger_leave_the_rest_to_the_first_sensor) {
   Explanation e = zeros_of_both(-0.02, -0.01);  // and nothing was ruled out: the catalogue's own entry
-  EXPECT_NE(tell_a_valves_zero({}, e).find("-0.0100 kg/cm2, with one of sensor 1, -0.0100"), std::string::npos);
+  EXPECT_NE(tell_a_valves_zero({}, e).find("-0.0100 kg/cm2, with one of sensor 1, -0.0100"),
+            std::string::npos);
   ASSERT_EQ(e.alternatives.size(), 1u);
   EXPECT_EQ(e.alternatives.front().subsystem, "pcu");
 }
