@@ -47,7 +47,7 @@ struct Found {
   std::vector<Step> settled;        ///< then: steps of the pressures' own rows, which that changes nothing of
   /// Ended at its beginning: the force sensors' zero wanders, so the torque of free runs is wanted beside their motion (prepared.hpp).
   bool wants_torque_of_free_runs = false;
-  /// The two effects that had hidden it, where two had: of this look's library.
+  /// What had hidden it, one effect or two: of this look's library.
   std::vector<std::pair<int, Values>> hid_the_zero;
   std::set<std::string> contenders;  ///< then: ids of what stood near the top of any screen
   std::vector<TrialNote> notes;

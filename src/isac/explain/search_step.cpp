@@ -124,12 +124,10 @@ bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
   say((found_.added.empty() ? "" : ranking_.id_of(found_.steps.back().trials.front()) + " and ") +
       ranking_.id_of(step.trials.front()) +
       " had hidden that the force sensors' zero wanders: once more beside what they leave");
-  if (!found_.added.empty()) {
-    found_.hid_the_zero = {{step.trials.front().hypothesis, step.trials.front().values}};
-    for (std::size_t i = 0; i < found_.added.size(); ++i)
-      found_.hid_the_zero.emplace_back(found_.added[i],
-                                       found_.model.model.effects[found_.model.tolerances + i].values);
-  }
+  found_.hid_the_zero = {{step.trials.front().hypothesis, step.trials.front().values}};
+  for (std::size_t i = 0; i < found_.added.size(); ++i)
+    found_.hid_the_zero.emplace_back(found_.added[i],
+                                     found_.model.model.effects[found_.model.tolerances + i].values);
   begin_anew_with_noise_of(rows);
   return true;
 }
