@@ -108,7 +108,7 @@ class Search {
   /// the runs tell more; then it is the mean of what they and the step say. A remainder may have `asked_for` it.
   bool leave_half_a_step(bool asked_for);
 
-  // One step: search_step.cpp.
+  // One step: search_step.cpp; what it takes for noise: search_noise.cpp.
   void choose_blocks(const Eigen::VectorXd& residual);
   ScreenOptions screen_options() const;
   void move_to(const Fit& fit);
