@@ -143,15 +143,12 @@ std::optional<Fit> borne_instead(const Predictor& predictor, const Library& libr
     if (bears && !first) first = std::move(fit);
   }
   if (!first) return first;
+  const std::size_t bear = borne.size();
   trials = std::move(borne);
-  const Ranking ranking(predictor.data(), library);
-  ranking.mark(trials);
+  trials.insert(trials.end(), ruled_out.begin(), ruled_out.end());
+  Ranking(predictor.data(), library).mark(trials);
+  for (std::size_t i = bear; i < trials.size(); ++i) trials[i].in_set = false;
   Ranking::weigh(trials);
-  for (Trial& t : ruled_out) {
-    t.in_set = false;
-    t.weight = 0;
-    trials.push_back(std::move(t));
-  }
   return first;
 }
 

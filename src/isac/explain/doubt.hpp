@@ -33,7 +33,8 @@ namespace isac::explain {
                               const Proof& proof, Chain chain, const ExplainOptions& options, Gap& gap);
 
 /// Of several names each must be borne by the held-out runs: one without which they fit better by 2 % rms in the chain where it shows most, and
-/// that rows freed of slow noise do not show (t < 1.645), is taken away, and a doubt tells that something more is missing.
+/// that rows freed of slow noise do not show (t < 1.645), leaves its place to the best rival, up to three sigma behind it, that those runs bear;
+/// where they bear none it is taken away, and a doubt tells that something more is missing.
 void take_away_what_is_refuted(const Predictor& predictor, const Library& library, const Proof& proof,
                                Found& found);
 

@@ -98,7 +98,8 @@ class Search {
   /// A skew within half a sample is tolerated, so that it stands for nothing else; where nothing else is missing and the skew is neither hardly
   /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is. What is found in its place stays if it leaves less.
   void doubt_the_clock();
-  /// Beside an effect, an offset of less than half a step may be how the encoder is read. In steps; 0: none is asked for.
+  /// Beside an effect, an offset of less than half a step may be how the encoder is read; beside one that holds an offset of its own, of less than a step.
+  /// In steps; 0: none is asked for.
   double offset_within_a_step(const Step& step) const;
   /// An offset that is left to how the encoder is read may be part of a general case of what was named: a hysteresis that differs by direction is
   /// one that does not and an offset. It stays in the set.

@@ -66,8 +66,8 @@ std::string tell_a_valves_zero(const std::vector<std::string>& excluded, Explana
   }
   const std::string sentence = fmt::format(
       "Zeros of both pressure sensors are the same as a zero of the valves, {} {}, with one of sensor {}, {} "
-      "{}: "
-      "no recording in which the valves control the pressure tells them apart; what the sensors read when "
+      "{}: no recording in which the valves control the pressure tells them apart; what the sensors read "
+      "when "
       "vented does.",
       rounded(common), unit, of_first ? 1 : 2, rounded(larger - common), unit);
   valve.evidence = {{true, sentence}};
