@@ -80,6 +80,19 @@ TEST(ExplainReport, shows_what_cannot_be_told_apart_and_the_experiment_that_woul
                 "constant-pressure"});
 }
 
+TEST(ExplainReport, says_a_direction_in_words_and_a_single_value_once) {
+  const auto said = [](const char* variable, double low, double high, const char* unit) {
+    return region_sentence({"muscle", "torque", variable, low, high, unit, 0.8});
+  };
+  EXPECT_EQ(said("direction", 0, 0, ""),
+            "muscle, torque: standing still holds 80 % of what can be explained");
+  EXPECT_EQ(said("direction", 1, 1, ""), "muscle, torque: moving up holds 80 % of what can be explained");
+  EXPECT_EQ(said("direction", -1, 1, ""), "muscle, torque: while moving holds 80 % of what can be explained");
+  EXPECT_EQ(said("frequency", 0.63, 0.63, "Hz"),
+            "muscle, torque: frequency 0.630 Hz holds 80 % of what can be explained");
+  EXPECT_NE(said("angle", 0.1, 0.2, "rad").find("from 0.100 to 0.200 rad"), std::string::npos);
+}
+
 TEST(ExplainReport, names_a_family_where_only_that_is_known) {
   const std::string html = page_of(tied_sample(Verdict::kFamily), "family");
   expect_parts(html,
