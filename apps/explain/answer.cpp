@@ -58,6 +58,7 @@ Json candidate_of(const Candidate& candidate) {
           {"confidence", json_number(candidate.confidence)},
           {"behind_best_sigma", json_number(candidate.behind_best)},
           {"closes", json_number(candidate.closes)},
+          {"missed_by_sigma", json_number(candidate.missed_by)},
           {"parameters", record::json_parameters(candidate.parameters)},
           {"supports", supports},
           {"against", against}};

@@ -74,7 +74,7 @@ TEST(Describe, tells_the_evidence_in_numbers_of_this_data) {
   const Candidate& named = e.effects.front();
   for (const Evidence& line : named.evidence)
     std::printf("%c %s\n", line.supports ? '+' : '-', line.sentence.c_str());
-  EXPECT_TRUE(says(named.evidence, "Taken out of the final model it is missed by "));
+  EXPECT_TRUE(says(named.evidence, "A model fitted without it misses "));
   EXPECT_TRUE(says(named.evidence, "standard errors from its absence"));
   EXPECT_TRUE(says(named.evidence, "highest: it stays"));  // the loop's width does not go with the speed
   EXPECT_NEAR(named.closes, 1, 0.01);  // the projected refit and the joint one end that close

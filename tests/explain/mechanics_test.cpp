@@ -374,6 +374,28 @@ TEST(Ranking, knows_no_rival_of_another_reading) {
   EXPECT_TRUE(trials[1].in_set);
 }
 
+// What noise puts behind once in thirty days is told too; not what was taken out of the set, a case of what is in it, or another reading.
+TEST(Ranking, tells_what_noise_may_have_put_behind_once_in_a_hundred_days) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
+  const Ranking ranking(bench.data, bench.library);
+  const auto told = [&](const char* rival, double behind) {
+    std::vector<Trial> trials = equally_good(bench, "coulomb_friction", rival);
+    trials[0].in_set = true;
+    trials[1].behind.t = behind;
+    trials[1].behind.separation = 6;
+    ranking.widen(trials);
+    EXPECT_NEAR(trials[0].weight + trials[1].weight, kSurest, 1e-12);
+    EXPECT_EQ(trials[1].weight > 0, trials[1].in_set);
+    return trials[1].in_set;
+  };
+  EXPECT_TRUE(told("cubic_stiffness", 1.7));
+  EXPECT_TRUE(told("cubic_stiffness", 2.3));
+  EXPECT_FALSE(told("cubic_stiffness", 2.4));
+  EXPECT_FALSE(told("cubic_stiffness", 1.6));
+  EXPECT_FALSE(told("stribeck_friction", 2));
+  EXPECT_FALSE(told("leak", 2));
+}
+
 TEST(Growth, is_the_same_by_its_series_and_by_the_exponential) {
   for (const double s : {1e-9, 1e-4, 0.019999, 0.020001, 0.1, 0.399, 0.401, 3.0})
     for (const double sign : {-1.0, 1.0})

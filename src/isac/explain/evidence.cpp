@@ -6,19 +6,11 @@
 
 #include "isac/explain/describe.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/taken_out.hpp"
 #include "isac/explain/where.hpp"
 
 namespace isac::explain {
 namespace {
-
-/// What the final model leaves over without one of its effects: measured − predicted in the chains' units; all else as fitted.
-Eigen::VectorXd left_without(const Predictor& predictor, const Found& found, std::size_t effect) {
-  ModelPoint model = found.model.model;
-  model.effects.erase(model.effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances + effect));
-  Eigen::VectorXd predicted = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(predictor.rows()));
-  predictor.predict(model, kAllChains, predicted);
-  return predictor.measured() - predicted;
-}
 
 /// Chain in which a weight sits most.
 Chain chain_of(const Prepared& data, const Eigen::VectorXd& weight) {
@@ -138,18 +130,12 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
   const Trial& best = step.trials.front();
   const Hypothesis& h = library.hypotheses[static_cast<std::size_t>(best.hypothesis)];
   c.closes = closes(found, step, best);
-  const Eigen::VectorXd left = left_without(predictor, found, index);
-  Eigen::VectorXd weighted = left;
-  weigh(data, found.weights, weighted);
-  const Eigen::VectorXd gain = weighted.array().square() - found.model.residual.array().square();
-  const double unit =
-      compare(data, found.model.residual, weighted, 0, noise_density(data, found.model.residual)).unit;
-  const double sigma = std::sqrt(std::max(0.0, gain.sum()) / std::max(unit, 1e-12));
+  const TakenOut without = taken_out(predictor, found, index);
   c.evidence.push_back(
       {true,
-       fmt::format("Taken out of the final model it is missed by {} sigma; what it adds is {} times the "
-                   "noise floor.",
-                   rounded(sigma, 3), rounded(best.material, 2))});
+       fmt::format(
+           "A model fitted without it misses {} sigma of data; what it adds is {} times the noise floor.",
+           rounded(c.missed_by, 3), rounded(best.material, 2))});
   if (!c.parameters.empty() && c.parameters.front().std_error > 0) {
     const Estimated& p = c.parameters.front();
     const double null = h.info().parameters[0].null_value / h.info().parameters[0].si_per_unit;
@@ -158,13 +144,13 @@ void evidence_of_added(const Predictor& predictor, const Library& library, const
                                               with_error(p.name, p.value, p.std_error, p.unit),
                                               rounded(std::abs(p.value - null) / p.std_error, 2))});
   }
-  const Chain chain = chain_of(data, gain);
-  const std::vector<Region> at = regions_of(data, chain, gain);
+  const Chain chain = chain_of(data, without.gain);
+  const std::vector<Region> at = regions_of(data, chain, without.gain);
   if (!at.empty())
     c.evidence.push_back({true, fmt::format("Its part in the {} is where the disagreement is: {}.",
                                             label_of(data, chain).signal, share_in_words(at.front()))});
   if (is_friction(h.effect) && (chain == Chain::kTorque || chain == Chain::kMotion))
-    add_widths(predictor, left, chain, c);
+    add_widths(predictor, without.left, chain, c);
   // The nearest rival, and what told it apart.
   for (std::size_t i = 1; i < step.trials.size(); ++i) {
     const Trial& t = step.trials[i];

@@ -24,6 +24,7 @@
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/search.hpp"
 #include "isac/explain/slip_moment.hpp"
+#include "isac/explain/taken_out.hpp"
 #include "isac/explain/two_zeros.hpp"
 #include "isac/explain/uncertainty.hpp"
 #include "isac/explain/unknown.hpp"
@@ -297,6 +298,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   for (std::size_t s = 0; s < found.added.size(); ++s) {
     const Step& step = found.steps[s];
     e.effects.push_back(candidate_of(library, step.trials.front(), step.trials.front().weight));
+    e.effects.back().missed_by = missed_by(predictor, found, s);
     family = family_of(library.hypotheses[static_cast<std::size_t>(step.trials.front().hypothesis)].effect);
     for (std::size_t i = 1; i < step.trials.size(); ++i) {
       const Trial& t = step.trials[i];
@@ -350,6 +352,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     }
     if (std::string why = told_by_one_run(predictor, proof, found); !why.empty())
       found.doubts.push_back(std::move(why));
+    if (std::string why = told_by_few_sigma(e.effects); !why.empty()) found.doubts.push_back(std::move(why));
     if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before && found.steps.front().units < kFew)
       found.doubts.push_back(
           fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "

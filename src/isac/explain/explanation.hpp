@@ -67,7 +67,8 @@ struct Candidate {
   std::vector<Estimated> parameters;  ///< in reporting units
   double behind_best = 0;             ///< sigma by which it fits worse than the best; 0 for the best
   double closes = kNotKnown;          ///< share of the explainable squared residual
-  std::vector<Evidence> evidence;     ///< sentences for and against
+  double missed_by = kNotKnown;  ///< of what was added: sigma of data that a model refitted without it lacks
+  std::vector<Evidence> evidence;  ///< sentences for and against
 };
 
 struct Unknown {

@@ -17,6 +17,7 @@ constexpr double kNestedLimit = 1.5, kNestedDoubt = 0.75;
 constexpr double kHardlyMore = 1.25;  // of the friction in motion: at rest it is nearly the same
 constexpr double kErrAlike = 0.1;     // of the larger: two sensors err by the same
 constexpr double kCoincidence = 3;    // sigma: as seldom do two sensors err by the same
+constexpr double kOneInAHundred = 2.33;
 constexpr double kLimitReach =
     8;  // sigma: what a limit case leads its simple case by is how roughly it is reached
 
@@ -147,6 +148,20 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
             ((parameters_of(t) > parameters_of(simple) && t.behind.t > -kNestedDoubt) ||
              is_limit_case(t.hypothesis, t.values)))
           t.in_set = false;
+  weigh(trials);
+}
+
+void Ranking::widen(std::vector<Trial>& trials) const {
+  const auto is_case_of_another = [&](const Trial& t) {
+    return std::any_of(trials.begin(), trials.end(), [&](const Trial& other) {
+      return other.in_set && (nests(id_of(t), id_of(other)) || nests(id_of(other), id_of(t)));
+    });
+  };
+  for (Trial& t : trials)
+    // (What is nearer and not in the set was taken out of it for a reason.)
+    if (!t.in_set && t.behind.t >= kSetLimit && t.behind.t < kOneInAHundred &&
+        share_readings(t, trials.front()) && !is_case_of_another(t))
+      t.in_set = true;
   weigh(trials);
 }
 

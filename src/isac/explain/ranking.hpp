@@ -62,6 +62,9 @@ class Ranking {
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.
   void rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const;
+  /// A single name is to be wrong on less than one day in a hundred: what noise alone puts as far behind once in a hundred days joins the set
+  /// that is told (t < 2.33), but for what is a simpler or a general case of one in it.
+  void widen(std::vector<Trial>& trials) const;
   /// Each against the first.
   void mark(std::vector<Trial>& trials) const;
   /// Shares of belief among those in the set.

@@ -45,6 +45,7 @@ Found Search::run() {
   if (found_.adequate) leave_half_a_step(false);
   if (!found_.added.empty()) found_.model = polished(predictor_, std::move(found_.model), found_.weights);
   leave_a_limit_to_its_simple_case();
+  for (std::size_t i = 0; i < found_.added.size(); ++i) ranking_.widen(found_.steps[i].trials);
   if (untold_half_step_ > 0)  // it stayed in the middle, and the intervals know how far it may be off
     tolerate(library_, data_, "encoder_offset", -untold_half_step_, untold_half_step_);
   look_at_limits();
