@@ -16,7 +16,7 @@ constexpr double kConventionOfTime = 0.01, kErrorsOfTime = 2, kMostOfTime = 0.06
 constexpr double kToldApart = 16;  // units of noise, four sigma: offsets that were not there closed 13
 constexpr double kOwnError =
     0.02;  // of the units that an effect closed: what its equation's own error may ask an offset for
-constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyond = 0.55;  // of a sample
+constexpr double kHardlySkewed = 0.1, kHalfASample = 0.03, kBeyondHalf = 0.55;  // of a sample
 
 /// Were it right, it would lead the best by half of what lies between them, give or take one sigma.
 bool may_be_right(const Comparison& behind) {
@@ -85,7 +85,7 @@ void Search::doubt_the_clock() {
       std::any_of(found_.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found_.model.tolerances),
                   found_.model.model.effects.end(), [&](const Active& a) {
                     return a.hypothesis->effect == tolerance.effect &&
-                           (!at_bound || std::abs(a.values[0]) > kBeyond * interval);
+                           (!at_bound || std::abs(a.values[0]) > kBeyondHalf * interval);
                   });
   const auto likelihood = [&](const Found& f) {
     return log_likelihood(data_, f.weights, unfiltered(data_, f.weights, f.model.residual));

@@ -10,10 +10,10 @@
 namespace isac::explain {
 namespace {
 
-constexpr std::size_t kBins = 24;
-constexpr std::size_t kFewestRows = 2400, kFewestBlocks = 16;
+constexpr std::size_t kCurveBins = 24;
+constexpr std::size_t kFewestCurveRows = 2400, kFewestBlocks = 16;
 constexpr int kFlips = 1000;
-constexpr double kStandsOut = 4.5;
+constexpr double kCurveStandsOut = 4.5;
 
 constexpr std::size_t kOfMotion = 2;  // the first ones
 constexpr const char* kVariables[] = {"angle", "velocity", "delta_pressure", "p1", "p2"};
@@ -70,11 +70,11 @@ Rows rows_of(const Prepared& data, const Eigen::VectorXd& weighted, const Eigen:
   return rows;
 }
 
-std::vector<double> borders_of(std::vector<double> values) {
+std::vector<double> quantiles_of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   std::vector<double> borders;
-  for (std::size_t j = 1; j < kBins; ++j) {
-    const double at = values[values.size() * j / kBins];
+  for (std::size_t j = 1; j < kCurveBins; ++j) {
+    const double at = values[values.size() * j / kCurveBins];
     if (borders.empty() || at > borders.back()) borders.push_back(at);
   }
   return borders;
@@ -92,8 +92,8 @@ std::pair<double, double> dependence(const Prepared& data, const std::vector<std
     values.push_back(x);
     of.push_back(k);
   }
-  if (values.size() < kFewestRows) return {};
-  const std::vector<double> borders = borders_of(values);
+  if (values.size() < kFewestCurveRows) return {};
+  const std::vector<double> borders = quantiles_of(values);
   const auto bins = static_cast<Eigen::Index>(borders.size() + 1);
   if (bins < 4) return {};
   Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(data.blocks), bins);
@@ -131,7 +131,7 @@ std::pair<double, double> dependence(const Prepared& data, const std::vector<std
 }  // namespace
 
 bool stands_out(const Curve& curve) noexcept {
-  return curve.z >= kStandsOut;
+  return curve.z >= kCurveStandsOut;
 }
 
 Curve clearest_curve(const Prepared& data, const Weights& weights, const Floors& floors,

@@ -20,8 +20,6 @@
 namespace isac::explain {
 namespace {
 
-constexpr int kRefitIterations = 8;
-
 /// The chain in which two fits of the same rows differ most, over the floor.
 Chain shows_most_in(const Predictor& predictor, const Found& found, const Fit& with, const Fit& without) {
   Chain chain = Chain::kTorque;

@@ -12,20 +12,11 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "isac/explain/coordinates.hpp"
 #include "isac/explain/predict.hpp"
 #include "isac/explain/weights.hpp"
 
 namespace isac::explain {
-
-/// One fitted number of a model.
-struct Coordinate {
-  int base = -1;                    ///< index in the baseline, or −1
-  int effect = -1, component = -1;  ///< of model.effects, else −1
-  int rest = -1;                    ///< run whose resting angle it is, else −1
-  double lower = 0, upper = 0, scale = 1;
-  unsigned chains = 0;
-  bool tolerance = false;
-};
 
 struct Fit {
   ModelPoint model;  ///< tolerances first among its effects
@@ -42,6 +33,7 @@ struct Fit {
 /// The baseline alone, with its tolerances, and, if asked for, where within a step of the encoder each resting run stands.
 [[nodiscard]] Fit fit_baseline(const Predictor& predictor, const std::vector<Hypothesis>& tolerances,
                                const Weights& weights, bool resting_angles = true);
+inline constexpr int kRefitIterations = 8;  ///< beside what is there already, once the search has ended
 /// `start.model` with `effects` added at their values, all refitted together.
 [[nodiscard]] Fit refit(const Predictor& predictor, const Fit& start, const std::vector<Active>& effects,
                         const Weights& weights, int iterations = 12);

@@ -15,7 +15,7 @@ constexpr std::size_t kTried = 24;     // columns that enter the selection, best
 constexpr double kWorthTaking = 0.10;  // of the first column's gain
 constexpr double kWorthTakingUnits = 12;
 constexpr std::size_t kMostTaken = 3;
-constexpr double kStandsOut = 0.7;  // of the search's limit
+constexpr double kNearLimit = 0.7;  // of the search's limit
 constexpr int kParametersOfOne = 1 + kChoosingOne;
 constexpr double kNearlyTheBest = 0.5;  // of the best gain: with the tolerances come back it may be the best
 constexpr double kGone = 1e-9;          // ‖rows‖²: those before it were all of it
@@ -102,7 +102,7 @@ StandingOut standing_out(const Around& place, const Screen& screen, int threads)
   std::size_t index = 0;
   for (const Column& c : screen.columns) {
     if (c.hypothesis >= 0) continue;
-    if (c.norm2 > 1e-9 && c.T >= kStandsOut * screen.limit)
+    if (c.norm2 > 1e-9 && c.T >= kNearLimit * screen.limit)
       order.emplace_back(c.score * c.score / c.norm2, index);
     ++index;
   }

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "isac/explain/kinship.hpp"
 #include "isac/explain/prepared.hpp"
 #include "isac/models/effect_hooks.hpp"
 
@@ -86,10 +87,5 @@ struct Library {
 
 /// Makes an effect a tolerance within bounds, or gives one that is there other bounds.
 void tolerate(Library& library, const Prepared& data, const std::string& id, double low, double high);
-
-/// Rate-independent dissipation, viscous, elastic …: what a tied verdict falls back to.
-[[nodiscard]] const char* family_of(int effect) noexcept;
-/// Is `simple` a special case of `general`?
-[[nodiscard]] bool nests(const std::string& general, const std::string& simple) noexcept;
 
 }  // namespace isac::explain

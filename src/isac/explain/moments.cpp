@@ -8,13 +8,13 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kBeyond = 4;  // times the usual mean square: in 32 empty datasets it reached 5 once
+constexpr double kBeyondUsual = 4;  // times the usual mean square: in 32 empty datasets it reached 5 once
 constexpr double kStandOut =
     0.03;  // of the noise's power; those had 0.006 at most, ten that hid such an effect 0.07 to 1.04 but for one
 // The balance of a free joint's motion differentiates the encoder's noise twice, and where a recorded one is louder for a second it had 6 to 9 times
 // the usual mean square on 6 of 370 empty days; fifteen stops that were struck had 8 to 376, and one of them less than 11.
 constexpr double kBurst = 10;
-constexpr double kFewestRows = 20;  // of an atom that counts
+constexpr double kFewestRowsOfAtom = 20;  // of an atom that counts
 constexpr std::size_t kFewestAtoms = 20;
 
 double median(std::vector<double> x) {
@@ -46,7 +46,7 @@ std::vector<Atom> atoms_of(const Prepared& data, const Eigen::VectorXd& residual
   }
   std::vector<Atom> enough;
   for (const auto& [index, a] : atoms)
-    if (a.rows >= kFewestRows) enough.push_back(a);
+    if (a.rows >= kFewestRowsOfAtom) enough.push_back(a);
   return enough;
 }
 
@@ -67,7 +67,7 @@ Moments moments_in(const Prepared& data, const Eigen::VectorXd& residual, Chain 
   std::map<unsigned, double> of_run;
   for (const auto& [run, squares] : by_run) of_run[run] = std::max(usual, median(squares));
   for (const Atom& a : atoms) {
-    const double beyond = a.mean_square() - kBeyond * of_run[a.run];
+    const double beyond = a.mean_square() - kBeyondUsual * of_run[a.run];
     if (!(beyond > 0)) continue;
     excess += beyond * a.rows;
     if (a.mean_square() <= found.times_usual * usual) continue;

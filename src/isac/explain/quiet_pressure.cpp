@@ -13,8 +13,8 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kMiddle = 0.15, kSlow = 1.0;  // s, kernels between the bands
-constexpr std::size_t kStride = 10;            // samples between the rows that G is fitted to
+constexpr double kBetween = 0.15, kSlow = 1.0;  // s, kernels between the bands
+constexpr std::size_t kStride = 10;             // samples between the rows that G is fitted to
 constexpr double kPrior =
     0.5;  // standard deviation of λ about 1 beforehand: where the torque cannot tell, the reading stands
 constexpr double kSettled = 0.4;  // s at a run's start in which p(0) is still felt
@@ -150,7 +150,7 @@ std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data, 
         rest[k] *= known;
       }
       const std::vector<double> narrow = low_pass(rest, sigma),
-                                middle = wide_low_pass(rest, kMiddle / run.interval),
+                                middle = wide_low_pass(rest, kBetween / run.interval),
                                 slow = wide_low_pass(rest, kSlow / run.interval);
       all[r].by_rule[i] = low_pass(ruled, sigma);
       for (auto& band : all[r].rest[i]) band.resize(rest.size());

@@ -59,6 +59,7 @@ void Search::hold_against_others() {
   if (found_.adequate) hold_against_a_step(baseline);
   if (found_.adequate) hold_against_a_drift(baseline);
   if (found_.adequate) hold_against_any_valve();
+  if (found_.adequate) hold_against_its_simple_case();
   if (found_.adequate) hold_against_itself(baseline);
 }
 

@@ -214,6 +214,8 @@ class Search {
   void hold_against_a_step(const Around& baseline);
   /// And what is said to have happened at once may have gone on all day, where no drift with a name says so.
   void hold_against_a_drift(const Around& baseline);
+  /// What a general effect has beyond its own simple case must be told, though that case has a name that is not looked for: simple_case.cpp.
+  void hold_against_its_simple_case();
   /// What comes and goes, or is large only because another takes it back, is none of the catalogue's effects.
   void hold_against_itself(const Around& baseline);
   /// What an adequate model leaves over by chance alone is seldom as unlikely as this, however little it be.

@@ -12,13 +12,13 @@
 namespace isac::explain {
 namespace {
 
-constexpr std::size_t kSide = 24;     // bins of the local floor on either side
-constexpr std::size_t kGuard = 2;     // bins beside a line that its leakage may reach
-constexpr std::size_t kFirstBin = 8;  // cycles in a run: fewer are drift
-constexpr double kCap = 9.0;          // nats that one of many runs may say
-constexpr double kStandsOut = 3.0;    // nats
-constexpr double kDriven = 7.0;       // nats by which a line of the motion is one
-constexpr double kSettling = 0.4;     // s at the start of a run that no residual counts (proof.hpp)
+constexpr std::size_t kSide = 24;       // bins of the local floor on either side
+constexpr std::size_t kGuard = 2;       // bins beside a line that its leakage may reach
+constexpr std::size_t kFirstBin = 8;    // cycles in a run: fewer are drift
+constexpr double kCap = 9.0;            // nats that one of many runs may say
+constexpr double kLineStandsOut = 3.0;  // nats
+constexpr double kDriven = 7.0;         // nats by which a line of the motion is one
+constexpr double kNotCounted = 0.4;     // s at the start of a run that no residual counts (proof.hpp)
 constexpr int kHarmonics = 15;
 // Of the squares of a line's amplitudes, without the noise's, what may differ between runs where the phase is that of one clock. Phases
 // by chance stay below it in one of exp(0.75 R) cases at most, which of six runs is one in ninety (Rayleigh's test).
@@ -281,7 +281,7 @@ std::vector<SpectralLine> spectral_lines(std::span<const Series> runs, double si
       const auto k = static_cast<std::size_t>(std::lround(f / s.resolution));
       if (k < kFirstBin || k >= s.x.size() || s.driven[k] != 0) continue;
       said.push_back(s.x[k]);
-      if (s.x[k] > kStandsOut) which.push_back(r);
+      if (s.x[k] > kLineStandsOut) which.push_back(r);
     }
     if (said.empty() || 2 * which.size() < said.size()) continue;
     const double cap = std::max(kCap, 40.0 / static_cast<double>(said.size()));
@@ -328,7 +328,7 @@ std::vector<Series> residual_series(const Predictor& predictor, const ModelPoint
                                                                     : run.torque;
     if (!predicted.empty() && predicted.size() == measured.size()) {
       std::size_t first = 0, last = predicted.size();
-      while (first < last && (mask[first] == 0 || run.time[first] < kSettling)) ++first;
+      while (first < last && (mask[first] == 0 || run.time[first] < kNotCounted)) ++first;
       while (last > first && mask[last - 1] == 0) --last;
       s.start = first < last ? run.time[first] : 0.0;
       const auto cut = [&](const std::vector<double>& x) {

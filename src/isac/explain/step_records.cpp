@@ -205,7 +205,7 @@ std::string lags_in_words(const std::vector<const PcuStep*>& steps) {
                            : fmt::format("first-order lags of {} to {} s", rounded(low, 2), rounded(high, 2));
 }
 
-std::string numbers_of(const Candidate& c) {
+std::string first_number_of(const Candidate& c) {
   if (c.parameters.empty()) return "";
   const Estimated& p = c.parameters.front();
   return fmt::format(" ({} = {} {})", p.name, rounded(p.value, 2), p.unit);
@@ -321,7 +321,7 @@ Explanation explain_steps(std::span<const series::Recording> runs) {
     }
     e.gap.after = told(best.rms);
     e.summary += fmt::format(" {}{} {}: {} → {} {}", upper_first(e.effects.front().name),
-                             numbers_of(e.effects.front()),
+                             first_number_of(e.effects.front()),
                              e.gap.after < 0.5 * e.gap.before ? "closes it" : "takes part of it",
                              rounded(e.gap.before), rounded(e.gap.after), kUnit);
     e.summary += e.alternatives.empty() ? "."

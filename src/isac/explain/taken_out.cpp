@@ -10,9 +10,7 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kFewSigma = 20;
-constexpr int kRefitIterations = 8;
-
+constexpr double kFewSigmaOfData = 20;
 }  // namespace
 
 TakenOut taken_out(const Predictor& predictor, const Found& found, std::size_t effect) {
@@ -44,7 +42,7 @@ std::string told_by_few_sigma(const std::vector<Candidate>& effects) {
   const auto fewest =
       std::min_element(effects.begin(), effects.end(),
                        [](const Candidate& a, const Candidate& b) { return a.missed_by < b.missed_by; });
-  if (fewest == effects.end() || !(fewest->missed_by < kFewSigma)) return "";
+  if (fewest == effects.end() || !(fewest->missed_by < kFewSigmaOfData)) return "";
   return fmt::format(
       "These recordings hold only {} sigma of it: they cannot tell {} from all that is nearly like it and in "
       "no catalogue.",

@@ -1,0 +1,23 @@
+/// @file
+/// Which effects are of one family, and which are special cases of which: what parsimony and a tied verdict go by.
+///
+/// Threads: pure. Errors: none. Source: docs/effects.md, docs/derivations/explain.md.
+#pragma once
+
+#include <algorithm>
+#include <initializer_list>
+#include <string>
+#include <string_view>
+
+namespace isac::explain {
+
+[[nodiscard]] constexpr bool one_of(std::string_view id, std::initializer_list<std::string_view> ids) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
+/// Rate-independent dissipation, viscous, elastic …: what a tied verdict falls back to. `effect`: index in the catalogue.
+[[nodiscard]] const char* family_of(int effect) noexcept;
+/// Is `simple` a special case of `general`? Both are ids.
+[[nodiscard]] bool nests(const std::string& general, const std::string& simple) noexcept;
+
+}  // namespace isac::explain
