@@ -188,7 +188,13 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"leave-one-out", "coloured", "creep", "9305", R"("verdict":"not_separable")",
              "a slip of the encoder before the last run, which alone showed it"},
         Miss{"leave-one-out", "quantised", "encoder_drift", "9306", R"("verdict":"not_separable")",
-             "a slip of the encoder, where a straight drift without a name leaves as little"}));
+             "a slip of the encoder, where a straight drift without a name leaves as little"},
+        Miss{"leave-one-out", "coloured", "force_gain_error", "9307", R"("verdict":"not_separable")",
+             "a zero of the force, of which these recordings hold 15 sigma"},
+        Miss{"leave-one-out", "coloured", "encoder_offset", "9307", R"("verdict":"not_separable")",
+             "a drift of the encoder, 1.9 sigma ahead of the constant torque that no data tell from it"},
+        Miss{"leave-one-out", "coloured", "bearing_friction", "9308", R"("verdict":"not_separable")",
+             "Stribeck friction, whose fall from rest to speed no data told"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

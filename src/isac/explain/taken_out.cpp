@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <vector>
 
 #include "isac/explain/labels.hpp"
@@ -10,7 +9,7 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kFewSigmaOfData = 20;
+constexpr double kFewSigmaOfData = 33;
 }  // namespace
 
 TakenOut taken_out(const Predictor& predictor, const Found& found, std::size_t effect) {
@@ -39,10 +38,10 @@ double missed_by(const Predictor& predictor, const Found& found, std::size_t eff
 }
 
 std::string told_by_few_sigma(const std::vector<Candidate>& effects) {
-  const auto fewest =
-      std::min_element(effects.begin(), effects.end(),
-                       [](const Candidate& a, const Candidate& b) { return a.missed_by < b.missed_by; });
-  if (fewest == effects.end() || !(fewest->missed_by < kFewSigmaOfData)) return "";
+  const Candidate* fewest = nullptr;
+  for (const Candidate& c : effects)
+    if (c.missed_by < (fewest == nullptr ? kFewSigmaOfData : fewest->missed_by)) fewest = &c;
+  if (fewest == nullptr) return "";
   return fmt::format(
       "These recordings hold only {} sigma of it: they cannot tell {} from all that is nearly like it and in "
       "no catalogue.",
