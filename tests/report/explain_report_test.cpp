@@ -112,6 +112,14 @@ TEST(ExplainReport, shows_two_effects_one_after_the_other) {
                       "+ transport delay"});
 }
 
+TEST(ExplainReport, says_what_is_no_step_of_the_gap_that_it_shows) {
+  constexpr const char* kElsewhere = "ransport delay of the tubes closes another signal";
+  Explanation two = two_sample();
+  EXPECT_EQ(page_of(two, "two").find(kElsewhere), std::string::npos);
+  two.waterfall.erase(two.waterfall.begin() + 1);
+  EXPECT_NE(page_of(two, "elsewhere").find(kElsewhere), std::string::npos);
+}
+
 TEST(ExplainReport, is_the_same_twice) {
   EXPECT_EQ(page_of(two_sample(), "two"), page_of(two_sample(), "two"));
 }
