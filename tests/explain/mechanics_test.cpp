@@ -10,6 +10,7 @@
 
 #include "experiment_bench.hpp"
 #include "isac/explain/generic_fit.hpp"
+#include "isac/explain/left_over.hpp"
 #include "isac/explain/predict_parts.hpp"
 #include "isac/explain/ranking.hpp"
 #include "prepared_day.hpp"
@@ -394,6 +395,24 @@ TEST(Ranking, tells_what_noise_may_have_put_behind_once_in_a_hundred_days) {
   EXPECT_FALSE(told("cubic_stiffness", 1.6));
   EXPECT_FALSE(told("stribeck_friction", 2));
   EXPECT_FALSE(told("leak", 2));
+}
+
+TEST(LeftOver, casts_a_doubt_by_its_size_beside_the_first_effects) {
+  const auto doubts = [](double p, double share, double first, Chain chain = Chain::kTorque) {
+    return casts_a_doubt(p, share * first, chain, first, true);
+  };
+  constexpr double kSeldom = 0.001, kLikely = 0.01;
+  EXPECT_TRUE(doubts(kSeldom, 0.061, 1));
+  EXPECT_FALSE(doubts(kSeldom, 0.059, 1));
+  EXPECT_TRUE(doubts(kSeldom, 0.096, 2.72));
+  EXPECT_FALSE(doubts(kSeldom, 0.06, 2.72));  // so much of its own equation may be wrong
+  EXPECT_FALSE(doubts(kSeldom, 0.099, 8));
+  EXPECT_TRUE(doubts(kSeldom, 0.101, 8));
+  EXPECT_FALSE(doubts(kLikely, 0.099, 1));
+  EXPECT_TRUE(doubts(kLikely, 0.101, 1));
+  EXPECT_FALSE(doubts(0.03, 0.5, 1));
+  EXPECT_TRUE(doubts(kSeldom, 0.016, 1, Chain::kPressure1));
+  EXPECT_FALSE(doubts(kLikely, 0.029, 1, Chain::kPressure1));
 }
 
 TEST(Growth, is_the_same_by_its_series_and_by_the_exponential) {

@@ -11,10 +11,10 @@ constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one 
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
                  kWorthDoubtingOfPressureIfSeldom = 0.015;
-// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred, and
-// the effect is not so strong that its equation's own error shows.
+// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred: the
+// less, the less of the effect's own equation may be wrong, which shows from two floors on.
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldomNoise = 0.005, kWorthDoubtingIfSeldom = 0.06,
-                 kStrong = 2;
+                 kOwnErrorShowsFrom = 2;
 
 std::vector<const Column*> function_columns(const Screen& screen) {
   std::vector<const Column*> functions;
@@ -125,9 +125,9 @@ LeftOfRuns left_of_runs(const Prepared& data, const Library& library, const Foun
 
 bool casts_a_doubt(double p_value, double size, Chain chain, double first_size, bool joint) noexcept {
   const bool seldom = p_value <= kSeldomNoise, pressure = (bit(chain) & kPressureChains) != 0;
-  const double of_torque = !joint                           ? kWorthDoubting
-                           : seldom && first_size < kStrong ? kWorthDoubtingIfSeldom
-                                                            : kWorthDoubtingOfTheJoint;
+  const double if_seldom = std::clamp(kWorthDoubtingIfSeldom * first_size / kOwnErrorShowsFrom,
+                                      kWorthDoubtingIfSeldom, kWorthDoubtingOfTheJoint);
+  const double of_torque = !joint ? kWorthDoubting : seldom ? if_seldom : kWorthDoubtingOfTheJoint;
   const double of_pressure = seldom ? kWorthDoubtingOfPressureIfSeldom : kWorthDoubtingOfPressure;
   return p_value <= kDoubtful && size >= (pressure ? of_pressure : of_torque) * first_size;
 }
