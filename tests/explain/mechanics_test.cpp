@@ -375,7 +375,7 @@ TEST(Ranking, knows_no_rival_of_another_reading) {
   EXPECT_TRUE(trials[1].in_set);
 }
 
-// What noise puts behind once in thirty days is told too; not what was taken out of the set, a case of what is in it, or another reading.
+// What noise puts behind more often than that is told too; not what was taken out of the set, a case of what is in it, or another reading.
 TEST(Ranking, tells_what_noise_may_have_put_behind_once_in_a_hundred_days) {
   const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
   const Ranking ranking(bench.data, bench.library);

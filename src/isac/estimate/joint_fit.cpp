@@ -113,13 +113,7 @@ JointFit fit_joint(std::span<const JointRun> runs, std::span<const JointRun> hel
   fit.box = validity_box(rows);
   std::vector<int> order;
   fit.parameters = judge_parameters(rows, terms, core, options, order);
-  fit.correlation.assign(order.size() * order.size(), std::nan(""));
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = 0; j < order.size(); ++j)
-      if (fit.parameters[i].identifiable && fit.parameters[j].identifiable)
-        fit.correlation[i * order.size() + j] =
-            core.covariance(order[i], order[j]) /
-            std::sqrt(core.covariance(order[i], order[i]) * core.covariance(order[j], order[j]));
+  fit.correlation = correlations(fit.parameters, order, core);
   fit.angle_zero = angle_zero(core.zero, options);
   fit.tests =
       residual_tests(rows, {core.used, core.zero.column, core.zero.resting, core.residual, core.omega},

@@ -152,6 +152,18 @@ std::string unexcited(const JointTerms& terms, std::size_t k, const Reach& reach
 
 }  // namespace
 
+std::vector<double> correlations(const std::vector<Estimated>& parameters, const std::vector<int>& order,
+                                 const JointCore& core) {
+  const std::size_t n = order.size();
+  std::vector<double> out(n * n, std::nan(""));
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j)
+      if (parameters[i].identifiable && parameters[j].identifiable)
+        out[i * n + j] = core.covariance(order[i], order[j]) /
+                         std::sqrt(core.covariance(order[i], order[i]) * core.covariance(order[j], order[j]));
+  return out;
+}
+
 ValidityBox validity_box(const JointRows& rows) {
   ValidityBox box;
   if (rows.size() == 0) return box;

@@ -16,6 +16,10 @@ namespace isac::estimate {
                                                       const JointCore& core, const JointFitOptions& options,
                                                       std::vector<int>& order);
 
+/// Of the estimates, row by row in the order of `parameters`, whose columns are `order`; NaN where one of the two is not identifiable.
+[[nodiscard]] std::vector<double> correlations(const std::vector<Estimated>& parameters,
+                                               const std::vector<int>& order, const JointCore& core);
+
 [[nodiscard]] ValidityBox validity_box(const JointRows& rows);
 
 /// Remarks on data and parameters (range of validity, signs, lost rows, too few blocks).

@@ -109,13 +109,7 @@ JointFit StreamingJointFit::finish() {
   fit.box = validity_box(s.sample);
   std::vector<int> order;
   fit.parameters = judge_parameters(s.sample, s.terms, core, s.options, order);
-  fit.correlation.assign(order.size() * order.size(), std::nan(""));
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = 0; j < order.size(); ++j)
-      if (fit.parameters[i].identifiable && fit.parameters[j].identifiable)
-        fit.correlation[i * order.size() + j] =
-            core.covariance(order[i], order[j]) /
-            std::sqrt(core.covariance(order[i], order[i]) * core.covariance(order[j], order[j]));
+  fit.correlation = correlations(fit.parameters, order, core);
   fit.angle_zero = angle_zero(core.zero, s.options);
   if (fit.angle_zero.used) fit.tests.push_back(zero_test(fit.angle_zero, core.zero, s.options));
   const Eigen::VectorXd moved = step.head(known);

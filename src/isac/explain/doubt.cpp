@@ -14,6 +14,7 @@
 #include "isac/explain/moments.hpp"
 #include "isac/explain/raw_effects.hpp"
 #include "isac/explain/slow_noise.hpp"
+#include "isac/explain/taken_out.hpp"
 #include "isac/explain/unknown.hpp"
 #include "isac/explain/variable_words.hpp"
 
@@ -157,9 +158,7 @@ void take_away_what_is_refuted(const Predictor& predictor, const Library& librar
   constexpr double kWorse = 1.02;
   if (proof.runs() == 0) return;
   for (std::size_t k = found.added.size(); k-- > 0 && found.added.size() > 1;) {
-    std::vector<Active> others;
-    for (std::size_t i = 0; i < found.added.size(); ++i)
-      if (i != k) others.push_back(found.model.model.effects[found.model.tolerances + i]);
+    const std::vector<Active> others = others_than(found, k);
     Fit without = refit(predictor, found.baseline, others, found.weights, kRefitIterations);
     const Chain chain = shows_most_in(predictor, found, found.model, without);
     const auto rms = [&](const Fit& fit) { return proof.residual(fit.model, chain).rms(); };

@@ -298,7 +298,6 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   for (std::size_t s = 0; s < found.added.size(); ++s) {
     const Step& step = found.steps[s];
     e.effects.push_back(candidate_of(library, step.trials.front(), step.trials.front().weight));
-    e.effects.back().missed_by = missed_by(predictor, found, s);
     family = family_of(library.hypotheses[static_cast<std::size_t>(step.trials.front().hypothesis)].effect);
     for (std::size_t i = 1; i < step.trials.size(); ++i) {
       const Trial& t = step.trials[i];
@@ -345,9 +344,12 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     doubt_what_is_left(predictor, library, proof, options, found);
     numbers = uncertainties(predictor, found.model, found.weights);
     for (std::size_t i = 0; i < found.added.size(); ++i) {
+      e.effects[i].missed_by = missed_by(predictor, found, i);
       std::vector<std::string> doubts = doubts_of_numbers(
           library.hypotheses[static_cast<std::size_t>(found.added[i])].info(), numbers->effects[i]);
-      if (!doubts.empty()) keep_simple_case(library, found.steps[i].trials, i, e);
+      const bool hardly_general = found.hardly_general.contains(found.added[i]);
+      if (!doubts.empty() || hardly_general) keep_simple_case(library, found.steps[i].trials, i, e);
+      if (hardly_general) continue;  // told already, by a fit: its numbers say no more
       for (std::string& why : doubts) found.doubts.push_back(std::move(why));
     }
     if (std::string why = told_by_one_run(predictor, proof, found); !why.empty())

@@ -11,6 +11,7 @@
 
 namespace isac::explain {
 
+/// Is the id one of these?
 [[nodiscard]] constexpr bool one_of(std::string_view id, std::initializer_list<std::string_view> ids) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }

@@ -11,8 +11,8 @@ constexpr double kDoubtful = 0.02;  // p of what a named model leaves over: one 
 // Of the first effect's size: an equation that is so nearly right is right. Noise of pressures is quick, noise of forces slow: less of it is noise.
 constexpr double kWorthDoubting = 0.17, kWorthDoubtingOfPressure = 0.03,
                  kWorthDoubtingOfPressureIfSeldom = 0.015;
-// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred: the
-// less, the less of the effect's own equation may be wrong, which shows from two floors on.
+// Beside the joint that the catalogue is of, less counts (a motor's own remainder is 0.16), and still less where noise has it on one day in two hundred. From
+// two floors on the effect's own equation may be what is left over, the more of it the larger the effect.
 constexpr double kWorthDoubtingOfTheJoint = 0.1, kSeldomNoise = 0.005, kWorthDoubtingIfSeldom = 0.06,
                  kOwnErrorShowsFrom = 2;
 

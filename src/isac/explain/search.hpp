@@ -50,6 +50,7 @@ struct Found {
   /// What had hidden it, one effect or two: of this look's library.
   std::vector<std::pair<int, Values>> hid_the_zero;
   std::set<std::string> contenders;  ///< then: ids of what stood near the top of any screen
+  std::set<int> hardly_general;      ///< hypotheses that their own simple cases do as well as, and so told
   std::vector<TrialNote> notes;
 };
 

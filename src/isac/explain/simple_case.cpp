@@ -1,7 +1,6 @@
 // A general effect held against its own simple case, whatever of the catalogue is looked for: part of the search (search_run.hpp).
 #include <fmt/format.h>
 
-#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -13,27 +12,22 @@ namespace {
 
 constexpr double kLeadsBy = 1.5;  // sigma that the general one leads by, as among names (ranking.cpp)
 
-/// Two numbers of an effect, held at which it is a simpler one, and what it then does not do.
+/// Numbers of an effect, held at which it is a simpler one, and what it then does not do.
 struct SimpleCase {
-  std::string_view form;
-  struct Held {
-    std::size_t number;
+  struct Number {
+    std::size_t at;
     double value;
-  } held[2];
-  const char* not_told;
+  };
+  std::vector<Number> held;
+  const char* not_told = "";
 };
 
-constexpr SimpleCase kSimpleCases[] = {
-    // Falls off at once: T_c sgn φ̇ is left, whatever T_s is.
-    {"stribeck_friction", {{1, 1}, {2, 1e-9}}, "falls from rest to speed"},
-    {"pressure_dependent_friction", {{1, 0}, {1, 0}}, "goes with the mean pressure"},
-    {"thermal_drift", {{0, 0}, {1, 0}}, "changes the stiffness or the gain"},
-};
-
-const SimpleCase* simple_case_of(const Hypothesis& h) {
-  for (const SimpleCase& c : kSimpleCases)
-    if (c.form == h.info().id) return &c;
-  return nullptr;
+SimpleCase simple_case_of(std::string_view form) {
+  // Falls off at once: T_c sgn φ̇ is left, whatever T_s is.
+  if (form == "stribeck_friction") return {{{1, 1}, {2, 1e-9}}, "falls from rest to speed"};
+  if (form == "pressure_dependent_friction") return {{{1, 0}}, "goes with the mean pressure"};
+  if (form == "thermal_drift") return {{{0, 0}, {1, 0}}, "changes the stiffness or the gain"};
+  return {};
 }
 
 }  // namespace
@@ -42,14 +36,14 @@ void Search::hold_against_its_simple_case() {
   for (std::size_t i = 0; i < found_.added.size(); ++i) {
     const std::size_t at = found_.model.tolerances + i;
     const Hypothesis& general = *found_.model.model.effects[at].hypothesis;
-    const SimpleCase* simple = simple_case_of(general);
-    if (simple == nullptr || !general.free[simple->held[0].number]) continue;
+    const SimpleCase simple = simple_case_of(general.info().id);
+    if (simple.held.empty() || !general.free[simple.held.front().at]) continue;
     Hypothesis held = general;
     std::vector<Active> effects(
         found_.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found_.model.tolerances),
         found_.model.model.effects.end());
     effects[i].hypothesis = &held;
-    for (const auto& [number, value] : simple->held) {
+    for (const auto& [number, value] : simple.held) {
       held.free[number] = false;
       effects[i].values[number] = value;
     }
@@ -59,11 +53,12 @@ void Search::hold_against_its_simple_case() {
                 noise_density(data_, found_.model.residual));
     const bool alike = behind.separation < kTwinLimit;
     say(fmt::format("{}: its simple case is {:.1f} sigma behind ({:.1f} sigma of data between them)",
-                    general.id(), behind.t, behind.separation));
+                    general.id(), told_behind(behind), behind.separation));
     if (!alike && behind.t >= kLeadsBy) continue;
+    found_.hardly_general.insert(found_.added[i]);
     found_.doubts.push_back(
         fmt::format("That {} {} is not told ({:.1f} sigma of data): it may be something simpler.",
-                    general.info().term, simple->not_told, behind.separation));
+                    general.info().term, simple.not_told, behind.separation));
   }
 }
 

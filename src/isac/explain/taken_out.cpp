@@ -10,6 +10,7 @@ namespace isac::explain {
 namespace {
 
 constexpr double kFewSigmaOfData = 33;
+
 }  // namespace
 
 TakenOut taken_out(const Predictor& predictor, const Found& found, std::size_t effect) {
@@ -26,12 +27,17 @@ TakenOut taken_out(const Predictor& predictor, const Found& found, std::size_t e
   return out;
 }
 
-double missed_by(const Predictor& predictor, const Found& found, std::size_t effect) {
+std::vector<Active> others_than(const Found& found, std::size_t effect) {
   std::vector<Active> others(
       found.model.model.effects.begin() + static_cast<std::ptrdiff_t>(found.model.tolerances),
       found.model.model.effects.end());
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(effect));
-  const Fit without = refit(predictor, found.baseline, others, found.weights, kRefitIterations);
+  return others;
+}
+
+double missed_by(const Predictor& predictor, const Found& found, std::size_t effect) {
+  const Fit without =
+      refit(predictor, found.baseline, others_than(found, effect), found.weights, kRefitIterations);
   return compare(predictor.data(), found.model.residual, without.residual, 0,
                  noise_density(predictor.data(), found.model.residual))
       .separation;

@@ -27,6 +27,9 @@ struct TakenOut {
 /// `effect`: which of those that were added. All else stays as it was fitted.
 [[nodiscard]] TakenOut taken_out(const Predictor& predictor, const Found& found, std::size_t effect);
 
+/// What else was added, as it was fitted.
+[[nodiscard]] std::vector<Active> others_than(const Found& found, std::size_t effect);
+
 /// s; all else is fitted anew.
 [[nodiscard]] double missed_by(const Predictor& predictor, const Found& found, std::size_t effect);
 

@@ -134,9 +134,8 @@ void add_gap(Document& page, const Explanation& e) {
       steps.rows.push_back({step.label, number(step.rmse, 3), number(step.heldout_rmse, 3)});
     page.table(steps);
     for (const Candidate& effect : e.effects) {
-      const bool is_step = std::any_of(e.waterfall.begin(), e.waterfall.end(), [&](const auto& step) {
-        return step.label.find(effect.name) != std::string::npos;
-      });
+      const bool is_step = std::any_of(e.waterfall.begin(), e.waterfall.end(),
+                                       [&](const auto& step) { return step.label.ends_with(effect.name); });
       if (!is_step && e.adds())
         page.paragraph(upper_first(effect.name) +
                        " closes another signal's gap, and is no step of this one.");
