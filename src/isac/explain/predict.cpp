@@ -82,21 +82,6 @@ void read_pressures(const ModelPoint& model, std::vector<double> (&p)[2]) {
   }
 }
 
-/// g ∗ x at one sample.
-class Kernel {
- public:
-  explicit Kernel(double sigma) : weights_(gaussian(std::max(sigma, 0.3), 0)) {}
-  double operator()(const std::vector<double>& x, std::size_t k) const { return centred_sum(weights_, x, k); }
-
- private:
-  std::vector<double> weights_;
-};
-
-/// Effects are driven by signals that one Gaussian has passed; rows of the motion have passed a wider one: σ² add up.
-double left_to_smooth(const Smoothing& smoothing) {
-  return std::sqrt(std::max(0.0, smoothing.motion * smoothing.motion - smoothing.torque * smoothing.torque));
-}
-
 bool reads_force(const ModelPoint& model) {
   return std::any_of(model.effects.begin(), model.effects.end(),
                      [](const Active& a) { return a.hypothesis->reads_force && !is_null(a); });
@@ -130,9 +115,12 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       if (data_->rows[i].chain == chain) out[static_cast<Eigen::Index>(i)] = value(data_->rows[i].sample);
   };
   if ((chains & bit(Chain::kTorque)) != 0 && run.has_torque) {
-    std::vector<double> extra = torque_of_effects(model, run, in, false), smooth;
     const bool row_by_row = reads_force(model) && reads_force_by_sample(model);
-    if (reads_force(model) && !row_by_row) {
+    const bool by_sample = reads_force(model) && !row_by_row;
+    std::vector<double> rows, smooth;
+    std::vector<double> extra = torque_of_effects(
+        model, by_sample ? model.effects : without_columns(model, index, in, false, rows), run, in, false);
+    if (by_sample) {
       // A torque of low-passed signals is low-passed already: a gain or a lag must not smooth its noise once more, or it would gain by that. (An
       // inertia of 6 % too much was called a force sensor's gain.) Effects' torques and clipped readings jump, and pass the kernel after that.
       if (!extra.empty()) extra = low_pass(extra, data_->smoothing.torque / run.interval);
@@ -159,14 +147,18 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       return sum;
     };
     const Kernel kernel(data_->smoothing.torque / run.interval);
+    const double* row = rows.data();
     for_rows(Chain::kTorque, [&](std::size_t k) {
-      const double torque =
-          base() + (smooth.empty() ? 0.0 : smooth[k]) + (extra.empty() ? 0.0 : kernel(extra, k));
+      const double torque = base() + (rows.empty() ? 0.0 : *row++) + (smooth.empty() ? 0.0 : smooth[k]) +
+                            (extra.empty() ? 0.0 : kernel(extra, k));
       return row_by_row ? torque + change_at(model, run, k, torque) : torque;
     });
   }
   if ((chains & bit(Chain::kMotion)) != 0 && run.is_free && !run.slow_acceleration.empty()) {
-    std::vector<double> extra = torque_of_effects(model, run, in, true);
+    std::vector<double> rows;
+    std::vector<double> extra = torque_of_effects(
+        model, reads_force(model) ? model.effects : without_columns(model, index, in, true, rows), run, in,
+        true);
     for (double& v : extra) v = -v;
     const double inertia = data_->rig.inertia;
     if (reads_force(model)) {
@@ -183,8 +175,10 @@ void Predictor::predict_run(const ModelPoint& model, std::size_t index, unsigned
       }
     }
     const Kernel kernel(left_to_smooth(data_->smoothing) / run.interval);
+    const double* row = rows.data();
     for_rows(Chain::kMotion, [&](std::size_t k) {
-      return inertia * (*in.slow_acceleration)[k] + (extra.empty() ? 0.0 : kernel(extra, k));
+      return inertia * (*in.slow_acceleration)[k] - (rows.empty() ? 0.0 : *row++) +
+             (extra.empty() ? 0.0 : kernel(extra, k));
     });
   }
   if ((chains & kPressureChains) != 0 && run.has_command && gain_ >= 0) {
@@ -202,45 +196,6 @@ bool Predictor::adds_up(const ModelPoint& model, const Hypothesis& effect) const
          std::none_of(model.effects.begin(), model.effects.end(), [](const Active& a) {
            return a.hypothesis->reads_force && !a.hypothesis->shifts_force && !is_null(a);
          });
-}
-
-/// How many samples a torque need not be asked for, between two that the kernel sums. It is a smooth function of signals that passed the
-/// kernel, so that the sum over steps of h ≤ 0.7 σ is the integral to exp(−½ (2π σ/h − σ ω)²): 1e-9 at σ ω = 2.5. Rows lie on the grid.
-std::size_t Predictor::thinned(const Hypothesis& effect, double sigma) const noexcept {
-  if (effect.dry || effect.info().state_count > 0 || std::string_view(effect.info().id) == "end_stop")
-    return 1;
-  constexpr double kLongestStep = 0.7;
-  const auto stride = static_cast<std::size_t>(data_->stride);
-  std::size_t every = 1;
-  for (std::size_t d = 2; d <= stride; ++d)
-    if (stride % d == 0 && static_cast<double>(d) <= kLongestStep * sigma) every = d;
-  return every;
-}
-
-void Predictor::predict_addition(const ModelPoint& model, const Active& effect, Eigen::VectorXd& out) const {
-  ModelPoint alone = model;
-  alone.effects = {effect};
-  for (std::size_t r = 0; r < data_->runs.size(); ++r) {
-    const PreparedRun& run = data_->runs[r];
-    const std::size_t begin = data_->run_begin[r], end = data_->run_begin[r + 1];
-    if (begin == end) continue;
-    const std::shared_ptr<const Inputs> in = inputs_of(model, r);
-    for (const Chain chain : {Chain::kTorque, Chain::kMotion}) {
-      const bool motion = chain == Chain::kMotion;
-      if ((effect.hypothesis->chains & bit(chain)) == 0) continue;
-      if (motion ? !run.is_free || run.slow_acceleration.empty() : !run.has_torque) continue;
-      const double sigma =
-          (motion ? left_to_smooth(data_->smoothing) : data_->smoothing.torque) / run.interval;
-      const std::size_t every = thinned(*effect.hypothesis, sigma);
-      const std::vector<double> torque = torque_of_effects(alone, run, *in, motion, every);
-      if (torque.empty()) continue;
-      const double sign = motion ? -1.0 : 1.0;
-      const Kernel kernel(sigma / static_cast<double>(every));
-      for (std::size_t i = begin; i < end; ++i)
-        if (data_->rows[i].chain == chain)
-          out[static_cast<Eigen::Index>(i)] = sign * kernel(torque, data_->rows[i].sample / every);
-    }
-  }
 }
 
 double Predictor::stiffness(const ModelPoint& model) const noexcept {
@@ -273,7 +228,7 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
   const Inputs& in = *kept;
   const bool reads = reads_force(model);
   if (run.has_torque && (run.has_pressure || !data_->baseline.terms.empty())) {
-    const std::vector<double> extra = torque_of_effects(model, run, in, false);
+    const std::vector<double> extra = torque_of_effects(model, model.effects, run, in, false);
     rate.torque.assign(run.time.size(),
                        index < model.rest.size() ? model.rest[index] * stiffness(model) : 0.0);
     add_base_torque(model, in, rate.torque);
@@ -286,7 +241,7 @@ Predictor::FullRate Predictor::full_rate(const ModelPoint& model, std::size_t in
     }
   }
   if (run.is_free && !run.slow_acceleration.empty() && std::isfinite(data_->rig.inertia)) {
-    std::vector<double> extra = torque_of_effects(model, run, in, true);
+    std::vector<double> extra = torque_of_effects(model, model.effects, run, in, true);
     if (!extra.empty())  // as φ̈ is, and what both are held against
       extra = low_pass(extra, left_to_smooth(data_->smoothing) / run.interval);
     rate.motion.resize(run.time.size());

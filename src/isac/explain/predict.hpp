@@ -78,16 +78,31 @@ class Predictor {
  private:
   struct Motions;
   struct Inputs;
+  struct Columns;
   std::shared_ptr<const Motions> motions_of(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Motions> make_motions(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Inputs> inputs_of(const ModelPoint& model, std::size_t run) const;
   std::shared_ptr<const Inputs> make_inputs(const ModelPoint& model, std::size_t run) const;
   void undo_angle_readings(const ModelPoint& model, std::size_t run, Motions& in) const;
   void add_columns(std::size_t run, Inputs& in) const;
-  /// At every sample, or at one of `every` where no effect has a memory.
-  std::vector<double> torque_of_effects(const ModelPoint& model, const PreparedRun& run, const Inputs& in,
-                                        bool motion, std::size_t every = 1) const;
+  /// Of some of the model's effects, at every sample; empty where none enters.
+  std::vector<double> torque_of_effects(const ModelPoint& model, std::span<const Active> effects,
+                                        const PreparedRun& run, const Inputs& in, bool motion) const;
+  /// Is it a torque that the rows of this chain have in them?
+  bool enters(const Hypothesis& effect, bool motion) const noexcept;
+  /// Adds to each of `sums` the effect's torque with one set of `values`, which share what its states depend on with those of `a`; at one
+  /// sample of `every` where it has no states.
+  void add_torques(const ModelPoint& model, const Active& a, const PreparedRun& run, const Inputs& in,
+                   std::size_t every, std::span<const Values> values,
+                   std::span<std::vector<double>> sums) const;
   std::size_t thinned(const Hypothesis& effect, double sigma) const noexcept;
+  /// Can its rows be had from columns? Not where it bends, or where states are read off the data.
+  bool has_columns(const Hypothesis& effect, bool motion) const noexcept;
+  std::shared_ptr<const Columns> columns_of(const ModelPoint& model, const Active& a, std::size_t run,
+                                            const Inputs& in, bool motion) const;
+  /// What the effects that have columns add to the run's rows of one chain, one value for each, and the effects that have none.
+  std::vector<Active> without_columns(const ModelPoint& model, std::size_t run, const Inputs& in, bool motion,
+                                      std::vector<double>& rows) const;
   /// Adds the baseline's own torque, at every sample.
   void add_base_torque(const ModelPoint& model, const Inputs& in, std::vector<double>& sum) const;
   void pressures_of(const ModelPoint& model, const PreparedRun& run, const Inputs& in,

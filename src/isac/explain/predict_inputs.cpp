@@ -1,6 +1,7 @@
 // What enters the equations: the measured signals, freed of what the model says of their sensors.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <memory>
 
@@ -355,8 +356,10 @@ std::shared_ptr<const Predictor::Motions> Predictor::make_motions(const ModelPoi
 std::shared_ptr<const Predictor::Inputs> Predictor::make_inputs(const ModelPoint& model,
                                                                 std::size_t index) const {
   const PreparedRun& run = data_->runs[index];
+  static std::atomic<std::uint64_t> counter{0};
   auto shared = std::make_shared<Inputs>();
   Inputs& in = *shared;
+  in.identity = ++counter;
   in.motions = motions_of(model, index);
   in.angle = in.motions->angle;
   in.velocity = in.motions->velocity;

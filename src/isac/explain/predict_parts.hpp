@@ -2,8 +2,10 @@
 /// What the files of the prediction share; for this room only.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -108,9 +110,31 @@ struct Predictor::Inputs {
   const std::vector<double>* pressure[2] = {nullptr, nullptr};
   std::vector<double> own_pressure[2];
   double first_pressure[2] = {0, 0};  ///< as the sensors' model has it, before what the muscles make force of
+  std::uint64_t identity = 0;         ///< of these inputs among all
   std::vector<double> columns;        ///< row-major: rows of the torque chain × terms
   mutable std::vector<double>
       terms;  ///< row-major: samples × terms, each with 1 for its parameter; empty until asked for
 };
+
+/// What an effect adds to the rows of one run and chain, by each of its amplitudes: low-passed, with 1 for that one and 0 for the others.
+struct Predictor::Columns {
+  std::vector<std::size_t> amplitudes;  ///< which of its parameters they are
+  std::vector<double> rows;             ///< row-major: rows × amplitudes
+};
+
+/// g ∗ x at one sample.
+class Kernel {
+ public:
+  explicit Kernel(double sigma) : weights_(gaussian(std::max(sigma, 0.3), 0)) {}
+  double operator()(const std::vector<double>& x, std::size_t k) const { return centred_sum(weights_, x, k); }
+
+ private:
+  std::vector<double> weights_;
+};
+
+/// Effects are driven by signals that one Gaussian has passed; rows of the motion have passed a wider one: σ² add up.
+[[nodiscard]] inline double left_to_smooth(const Smoothing& smoothing) {
+  return std::sqrt(std::max(0.0, smoothing.motion * smoothing.motion - smoothing.torque * smoothing.torque));
+}
 
 }  // namespace isac::explain

@@ -30,7 +30,9 @@ class Memory {
         dry_(active.hypothesis->dry),
         plays_(active.hypothesis->id() == "backlash") {}
   void rest(const JointPoint<double>& x) { Effect::rest(q_, x, z_); }
-  double torque(const JointPoint<double>& x) const { return Effect::torque(q_, x, z_); }
+  double torque(const JointPoint<double>& x) const { return torque(q_, x); }
+  /// With other amplitudes, which the states owe nothing to.
+  double torque(const double* q, const JointPoint<double>& x) const { return Effect::torque(q, x, z_); }
   void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
     JointPoint<double> middle = to;
     middle.angle = 0.5 * (from.angle + to.angle);
@@ -154,52 +156,64 @@ void Predictor::add_base_torque(const ModelPoint& model, const Inputs& in, std::
     for (const double parameter : output) torque += parameter * *term++;
 }
 
-std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, const PreparedRun& run,
-                                                 const Inputs& in, bool motion, std::size_t every) const {
-  const bool seed = data_->baseline.terms.empty();
+std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, std::span<const Active> effects,
+                                                 const PreparedRun& run, const Inputs& in, bool motion) const {
   std::vector<double> sum;
-  for (const Active& a : model.effects) {
+  for (const Active& a : effects) {
     const Hypothesis& h = *a.hypothesis;
-    if (h.info().hook != Hook::kTorque) continue;
-    if (seed && (h.seen_by == SeenBy::kMotionOnly) != motion) continue;
-    if (is_null(a)) continue;
-    if (sum.empty()) sum.assign((run.time.size() + every - 1) / every, 0.0);
-    const double sign = data_->baseline.driven ? -1.0 : 1.0;
-    const auto term = [&](int at) { return at >= 0 ? model.base[static_cast<std::size_t>(at)] : 0.0; };
-    const BaselineOfPoint base{.stiffness = term(stiffness_),
-                               .pressure_gain = term(pressure_gain_),
-                               .cubic_damping = term(cubic_damping_),
-                               .damping = term(damping_)};
-    const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
+    if (!enters(h, motion) || is_null(a)) continue;
+    if (sum.empty()) sum.assign(run.time.size(), 0.0);
     if (motion && has_fitted_states(h) && in.swing != nullptr) {
+      const double sign = data_->baseline.driven ? -1.0 : 1.0;
       add_swing(a, *in.swing, run.interval, sign, sum);
       if (!a.as_known_beforehand)
         add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration,
                  in.swing->from_rest ? kAtRest : kAtStart, sign, sum);
       continue;
     }
-    const auto at = [&](std::size_t k) {
-      return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure,
-                      time_of(h, run, k), k);
-    };
-    if (h.info().state_count == 0) {
-      models::add_effect_torques(
-          h.effect, a.values.data(), [&](std::size_t k) { return at(k * every); }, sign, std::span(sum));
-      continue;
-    }
-    models::visit_torque_memory(h.effect, [&](auto effect) {
-      Memory<decltype(effect)> memory(a);
-      JointPoint<double> x = at(0);
-      memory.rest(x);
-      for (std::size_t k = 0; k < sum.size(); ++k) {
-        const JointPoint<double> next = k == 0 ? x : at(k);
-        if (k > 0) memory.step(x, next, run.interval);
-        x = next;
-        sum[k] += sign * memory.torque(x);
-      }
-    });
+    add_torques(model, a, run, in, 1, std::span(&a.values, 1), std::span(&sum, 1));
   }
   return sum;
+}
+
+bool Predictor::enters(const Hypothesis& h, bool motion) const noexcept {
+  return h.info().hook == Hook::kTorque &&
+         (!data_->baseline.terms.empty() || (h.seen_by == SeenBy::kMotionOnly) == motion);
+}
+
+void Predictor::add_torques(const ModelPoint& model, const Active& a, const PreparedRun& run,
+                            const Inputs& in, std::size_t every, std::span<const Values> values,
+                            std::span<std::vector<double>> sums) const {
+  const Hypothesis& h = *a.hypothesis;
+  const double sign = data_->baseline.driven ? -1.0 : 1.0;
+  const auto term = [&](int at) { return at >= 0 ? model.base[static_cast<std::size_t>(at)] : 0.0; };
+  const BaselineOfPoint base{.stiffness = term(stiffness_),
+                             .pressure_gain = term(pressure_gain_),
+                             .cubic_damping = term(cubic_damping_),
+                             .damping = term(damping_)};
+  const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
+  const auto at = [&](std::size_t k) {
+    return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure, time_of(h, run, k),
+                    k);
+  };
+  if (h.info().state_count == 0) {
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      models::add_effect_torques(
+          h.effect, values[i].data(), [&](std::size_t k) { return at(k * every); }, sign,
+          std::span(sums[i]));
+    return;
+  }
+  models::visit_torque_memory(h.effect, [&](auto effect) {
+    Memory<decltype(effect)> memory(a);
+    JointPoint<double> x = at(0);
+    memory.rest(x);
+    for (std::size_t k = 0; k < sums[0].size(); ++k) {
+      const JointPoint<double> next = k == 0 ? x : at(k);
+      if (k > 0) memory.step(x, next, run.interval);
+      x = next;
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i][k] += sign * memory.torque(values[i].data(), x);
+    }
+  });
 }
 
 double Predictor::change_at(const ModelPoint& model, const PreparedRun& run, std::size_t k,

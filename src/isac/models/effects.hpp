@@ -51,6 +51,17 @@ using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::M
   return -1;
 }
 
+/// Is a torque effect linear in the parameters that have a null value, all of them 0, for given others, which alone its states depend on? So is
+/// each that is linear at all, and each that has a shape (a width, a time, a place) besides its amplitudes.
+[[nodiscard]] constexpr bool is_linear_for_its_shape(const EffectInfo& info) noexcept {
+  bool linear = info.linear;
+  for (int i = 0; i < info.parameter_count; ++i) {
+    const double null = info.parameters[i].null_value;
+    linear = linear || null != null;
+  }
+  return linear && info.hook == Hook::kTorque;
+}
+
 namespace detail {
 
 template <class S>
