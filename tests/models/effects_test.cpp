@@ -170,6 +170,43 @@ TEST_F(EveryEffect, does_something_at_its_typical_values) {
   }
 }
 
+TEST_F(EveryEffect, of_the_torque_with_a_shape_is_linear_in_its_amplitudes) {
+  int asked = 0;
+  for (index_ = 0; index_ < Catalogue::kSize; ++index_) {
+    if (!is_linear_for_its_shape(info())) continue;
+    SCOPED_TRACE(info().id);
+    ++asked;
+    const auto is_shape = [&](int k) { return std::isnan(info().parameters[k].null_value); };
+    for (int k = 0; k < info().parameter_count; ++k)
+      if (!is_shape(k)) EXPECT_EQ(info().parameters[k].null_value, 0);
+    for (int i = 0; i < 200; ++i) {
+      auto point = random_point();
+      const double z[2] = {uniform(-1, 1), uniform(-1, 1)};
+      double a[kMaxEffectParameters], b[kMaxEffectParameters], sum[kMaxEffectParameters];
+      random_parameters(a);
+      random_parameters(b);
+      const double s = uniform(-2, 2), t = uniform(-2, 2);
+      for (int k = 0; k < info().parameter_count; ++k) {
+        if (is_shape(k)) b[k] = a[k];
+        sum[k] = is_shape(k) ? a[k] : s * a[k] + t * b[k];
+      }
+      const double of_a = effect_torque(index(), a, point, z), of_b = effect_torque(index(), b, point, z),
+                   of_sum = effect_torque(index(), sum, point, z);
+      EXPECT_NEAR(of_sum, s * of_a + t * of_b, 1e-12 * (std::abs(s * of_a) + std::abs(t * of_b)) + 1e-12);
+      // Neither its states nor what else the baseline has in it depend on the amplitudes.
+      double rate_a[2] = {}, rate_sum[2] = {};
+      effect_derivative(index(), a, point, z, rate_a);
+      effect_derivative(index(), sum, point, z, rate_sum);
+      for (int k = 0; k < info().state_count; ++k) EXPECT_EQ(rate_a[k], rate_sum[k]);
+      point.stiffness = point.pressure_gain = point.cubic_damping = point.damping = kAnyValue;
+      EXPECT_EQ(effect_torque(index(), a, point, z), of_a);
+    }
+  }
+  EXPECT_GE(asked, 30);
+  EXPECT_FALSE(is_linear_for_its_shape(effect_catalogue()[find_effect("backlash")]));
+  EXPECT_FALSE(is_linear_for_its_shape(effect_catalogue()[find_effect("lever_arm_variation")]));
+}
+
 TEST_F(EveryEffect, that_is_called_linear_obeys_superposition) {
   for (index_ = 0; index_ < Catalogue::kSize; ++index_) {
     if (!info().linear) continue;  // not linear in its parameters

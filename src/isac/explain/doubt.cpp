@@ -9,6 +9,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/explain/curves.hpp"
+#include "isac/explain/halves.hpp"
 #include "isac/explain/labels.hpp"
 #include "isac/explain/left_over.hpp"
 #include "isac/explain/moments.hpp"
@@ -210,6 +211,28 @@ void doubt_what_is_left(const Predictor& predictor, const Library& library, cons
       of_held_out ? "the held-out runs" : "all runs, the held-out ones among them", 1 / most.p_value,
       most.size, in_words(label_of(predictor.data(), most.chain))));
   if (options.progress) options.progress(found.doubts.back());
+}
+
+void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions& options, Found& found,
+                                Explanation& e) {
+  const Around place = around(predictor, found.model, found.weights);
+  for (std::size_t i = 0; i < found.added.size(); ++i) {
+    const std::vector<Halves> halves = halves_of(place, found.model.tolerances + i, options.threads);
+    if (halves.empty()) continue;
+    const Halves& most = halves.front();
+    if (!differs_by_half(most)) {
+      e.effects[i].evidence.push_back(
+          {true, fmt::format("Cut in halves in {} ways it is the same in both; where they differ most, {}, "
+                             "that is {} sigma.",
+                             halves.size(), most.where,
+                             most.sigma < 1 ? "less than one" : rounded(most.sigma, 2))});
+      continue;
+    }
+    found.doubts.push_back(fmt::format("{} is not the same {}: by {:.2g} % of it, {:.1f} sigma.",
+                                       found.added.size() == 1 ? "It" : e.effects[i].id, most.where,
+                                       100 * most.share, most.sigma));
+    if (options.progress) options.progress(found.doubts.back());
+  }
 }
 
 void doubt(const Predictor& predictor, const Found& found, Explanation& e) {

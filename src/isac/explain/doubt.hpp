@@ -9,7 +9,7 @@
 ///                 not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, leaves over what chance seldom does, or in a few moments what noise
 ///                 holds nowhere else, or functions without a name do as well (remainder.cpp), or its numbers speak against its name
-///                 (number_doubts.hpp), or held-out runs, alone or with the fitted ones, leave over what chance seldom does (left_over.hpp)
+///                 (number_doubts.hpp), or it is not the same in both halves of something (halves.hpp), or held-out runs, alone or with the fitted ones, leave over what chance seldom does (left_over.hpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too, or a few moments that hold what noise holds
 ///                 nowhere else (moments.hpp), or slow noise that is none: by its steps a zero (memory 100 s) that would wander by more than 1.5
 ///                 times the rms, or steps from one bin of 2 s to the next of eight times the mean square of the median run
@@ -41,6 +41,10 @@ void take_away_what_is_refuted(const Predictor& predictor, const Library& librar
 /// What the model leaves of runs that it has not seen, or of all runs together, and noise does not, casts a doubt (left_over.hpp).
 void doubt_what_is_left(const Predictor& predictor, const Library& library, const Proof& proof,
                         const ExplainOptions& options, Found& found);
+
+/// What is not the same in both halves of something is doubted (halves.hpp); what is has that for it.
+void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions& options, Found& found,
+                                Explanation& e);
 
 /// The name stands, and beside it that it may be none of the catalogue: what it leaves over says so.
 void doubt(const Predictor& predictor, const Found& found, Explanation& e);

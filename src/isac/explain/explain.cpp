@@ -342,6 +342,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   std::optional<Uncertain> numbers;
   if (e.verdict != Verdict::kUnknown && !found.added.empty()) {
     doubt_what_is_left(predictor, library, proof, options, found);
+    doubt_what_differs_by_half(predictor, options, found, e);
     numbers = uncertainties(predictor, found.model, found.weights);
     for (std::size_t i = 0; i < found.added.size(); ++i) {
       e.effects[i].missed_by = missed_by(predictor, found, i);

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string_view>
 
+#include "isac/explain/kinship.hpp"
 #include "isac/explain/predict_parts.hpp"
 
 namespace isac::explain {
@@ -51,9 +51,12 @@ bool Predictor::has_columns(const Hypothesis& effect, bool motion) const noexcep
 }
 
 /// How many samples a torque need not be asked for, between two that the kernel sums. It is a smooth function of signals that passed the
-/// kernel, so that the sum over steps of h ≤ 0.7 σ is the integral to exp(−½ (2π σ/h − σ ω)²): 1e-9 at σ ω = 2.5. Rows lie on the grid.
+/// kernel, so that the sum over steps of h ≤ 0.7 σ is the integral to exp(−½ (2π σ/h − σ ω)²): 1e-9 at σ ω = 2.5; with what pressures and the
+/// encoder's noise have beyond that, to 1e-4 of the torque (explain_columns_test). Rows lie on the grid. Every sample is asked of what jumps,
+/// bends in a corner or goes with the acceleration, which is of the encoder's noise at high frequencies.
 std::size_t Predictor::thinned(const Hypothesis& effect, double sigma) const noexcept {
-  if (effect.dry || effect.info().state_count > 0 || std::string_view(effect.info().id) == "end_stop")
+  if (effect.dry || effect.info().state_count > 0 ||
+      one_of(effect.info().id, {"end_stop", "tension_loss", "inertia", "inertia_error"}))
     return 1;
   constexpr double kLongestStep = 0.7;
   const auto stride = static_cast<std::size_t>(data_->stride);
@@ -84,11 +87,10 @@ std::shared_ptr<const Predictor::Columns> Predictor::columns_of(const ModelPoint
       ones.back()[i] = 1;
     }
     const PreparedRun& run = data_->runs[index];
-    const double sigma =
-        (motion ? left_to_smooth(data_->smoothing) : data_->smoothing.torque) / run.interval;
+    const double sigma = (motion ? left_to_smooth(data_->smoothing) : data_->smoothing.torque) / run.interval;
     const std::size_t every = thinned(h, sigma);
-    std::vector<std::vector<double>> torques(
-        ones.size(), std::vector<double>((run.time.size() + every - 1) / every, 0.0));
+    std::vector<std::vector<double>> torques(ones.size(),
+                                             std::vector<double>((run.time.size() + every - 1) / every, 0.0));
     add_torques(model, a, run, in, every, ones, torques);
     const Kernel kernel(sigma / static_cast<double>(every));
     const Chain chain = motion ? Chain::kMotion : Chain::kTorque;

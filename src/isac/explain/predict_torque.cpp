@@ -157,7 +157,8 @@ void Predictor::add_base_torque(const ModelPoint& model, const Inputs& in, std::
 }
 
 std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, std::span<const Active> effects,
-                                                 const PreparedRun& run, const Inputs& in, bool motion) const {
+                                                 const PreparedRun& run, const Inputs& in,
+                                                 bool motion) const {
   std::vector<double> sum;
   for (const Active& a : effects) {
     const Hypothesis& h = *a.hypothesis;
@@ -199,8 +200,7 @@ void Predictor::add_torques(const ModelPoint& model, const Active& a, const Prep
   if (h.info().state_count == 0) {
     for (std::size_t i = 0; i < sums.size(); ++i)
       models::add_effect_torques(
-          h.effect, values[i].data(), [&](std::size_t k) { return at(k * every); }, sign,
-          std::span(sums[i]));
+          h.effect, values[i].data(), [&](std::size_t k) { return at(k * every); }, sign, std::span(sums[i]));
     return;
   }
   models::visit_torque_memory(h.effect, [&](auto effect) {
