@@ -228,10 +228,16 @@ void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions
                              most.sigma < 1 ? "less than one" : rounded(most.sigma, 2))});
       continue;
     }
-    found.doubts.push_back(fmt::format("{} is not the same {}: by {:.2g} % of it, {:.1f} sigma.",
-                                       found.added.size() == 1 ? "It" : e.effects[i].id, most.where,
-                                       100 * most.share, most.sigma));
-    if (options.progress) options.progress(found.doubts.back());
+    std::string differs = fmt::format("{} is not the same {}: by {:.2g} % of it, {:.1f} sigma.",
+                                      found.added.size() == 1 ? "It" : e.effects[i].id, most.where,
+                                      100 * most.share, most.sigma);
+    if (!predictor.data()
+             .baseline.terms.empty()) {  // another machine's friction is seldom of the catalogue's form
+      e.effects[i].evidence.push_back({false, std::move(differs)});
+      continue;
+    }
+    if (options.progress) options.progress(differs);
+    found.doubts.push_back(std::move(differs));
   }
 }
 

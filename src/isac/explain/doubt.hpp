@@ -42,7 +42,8 @@ void take_away_what_is_refuted(const Predictor& predictor, const Library& librar
 void doubt_what_is_left(const Predictor& predictor, const Library& library, const Proof& proof,
                         const ExplainOptions& options, Found& found);
 
-/// What is not the same in both halves of something is doubted (halves.hpp); what is has that for it.
+/// What is not the same in both halves of something is doubted (halves.hpp), beside the joint that the catalogue is of: elsewhere that is evidence
+/// against it, and what is the same has that for it.
 void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions& options, Found& found,
                                 Explanation& e);
 

@@ -176,7 +176,7 @@ std::vector<Halves> halves_of(const Around& place, std::size_t effect, int threa
 }
 
 bool differs_by_half(const Halves& halves) noexcept {
-  constexpr double kForSure = 4.5;    // sigma
+  constexpr double kForSure = 4.0;    // sigma
   constexpr double kOwnError = 0.01;  // of the effect: a name's own equation is right to less
   return halves.sigma >= kForSure && halves.share >= kOwnError;
 }
