@@ -30,8 +30,8 @@ Chain shows_most_in(const Predictor& predictor, const Found& found, const Fit& w
   return chain;
 }
 
-constexpr double kNoneOfThem =
-    0.08;  // of the belief, where a name leaves over what chance seldom does: explain.md
+constexpr double kNoneOfThemByHalves =
+    0.5;  // of the belief: no right name differs so, and most wrong ones do
 
 /// A model that does worse on what it has not seen is not an explanation, neither beside the search's own baseline nor beside what anyone
 /// would have fitted.
@@ -238,19 +238,20 @@ void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions
     }
     if (options.progress) options.progress(differs);
     found.doubts.push_back(std::move(differs));
+    found.none_of_them = kNoneOfThemByHalves;
   }
 }
 
 void doubt(const Predictor& predictor, const Found& found, Explanation& e) {
   for (auto* named : {&e.effects, &e.alternatives})
-    for (Candidate& c : *named) c.confidence *= 1 - kNoneOfThem;
+    for (Candidate& c : *named) c.confidence *= 1 - found.none_of_them;
   const Step& last = found.steps.back();
   Unknown left = describe_unknown(around(predictor, found.model, found.weights), last.screen);
   Candidate none;
   none.id = none.form = "unknown";
   none.name = "an effect that the catalogue does not have";
   none.subsystem = left.subsystem.empty() ? e.effects.front().subsystem : left.subsystem;
-  none.confidence = kNoneOfThem * kSurest;
+  none.confidence = found.none_of_them * kSurest;
   none.behind_best = kNotKnown;  // nothing was fitted
   e.alternatives.push_back(none);
   e.verdict = Verdict::kNotSeparable;

@@ -41,6 +41,7 @@ struct Found {
   Gate gate;  ///< of the baseline
   /// Why what was named may be none of the catalogue, though nothing significant is left; empty: nothing says so.
   std::vector<std::string> doubts;
+  double none_of_them = 0.08;  ///< of the belief, that a doubted name is none of the catalogue
   /// Ended early: an effect of the valves was found and more is missing, so the torque's pressures are to be quieted beside that effect first.
   bool worth_another_look = false;
   bool colour_beside_best = false;  ///< the noise's colour was read off beside an effect
