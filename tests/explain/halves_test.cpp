@@ -79,7 +79,7 @@ TEST(Halves, of_a_friction_beside_a_constant_torque_differ_by_direction) {
 TEST(Halves, of_a_friction_that_goes_with_the_pressure_differ_by_pressure) {
   Day day({.dry = 0.03, .load_exponent = 1});
   const std::vector<Halves> halves = day.halves(day.fitted("coulomb_friction"));
-  EXPECT_EQ(std::string_view(halves.front().where), kPressure);
+  EXPECT_EQ(halves.front().where, kPressure);
   EXPECT_TRUE(differs_by_half(halves.front())) << halves.front().sigma;
   EXPECT_FALSE(differs_by_half(in(kDirection, halves)));
   const std::vector<Halves> right = day.halves(day.fitted("pressure_dependent_friction"));

@@ -66,7 +66,8 @@ void add_widths(const Predictor& predictor, const Eigen::VectorXd& left, Chain c
          fmt::format("Without it the residual makes a loop over the direction of motion, {} {} wide on "
                      "either side in the third of the rows with the lowest {}, {} in the third with the "
                      "highest: {}.",
-                     rounded(w.low * label.scale, 2), label.unit, variable, rounded(w.high * label.scale, 2),
+                     rounded(std::abs(w.low) * label.scale, 2), label.unit, variable,
+                     rounded(std::abs(w.high) * label.scale, 2),
                      change > 0.25    ? "it grows"
                      : change < -0.25 ? "it shrinks"
                                       : "it stays")});

@@ -6,9 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
 
 #include "isac/explain/coordinates.hpp"
+#include "isac/explain/labels.hpp"
 #include "isac/explain/slopes.hpp"
+#include "isac/explain/variable_words.hpp"
 
 namespace isac::explain {
 namespace {
@@ -18,8 +22,8 @@ constexpr double kNextToNothing = 0.02;  // of the effect's square
 
 /// Something that is high or low, or goes one way or the other.
 struct Variable {
-  const char* where;
-  bool about_zero;  ///< else about the median
+  const char* where;  ///< {}: "angle", or "position" of a linear axis
+  bool about_zero;    ///< else about the median
   double (*value)(const PreparedRun& run, const Row& row);
 };
 
@@ -36,9 +40,9 @@ constexpr Variable kVariables[] = {
      [](const PreparedRun& run, const Row& row) { return of_motion(run.dry_velocity, row); }},
     {"at low and at high speed", false,
      [](const PreparedRun& run, const Row& row) { return std::abs(of_motion(run.velocity, row)); }},
-    {"at low and at high angles", false,
+    {"at low and at high {}s", false,
      [](const PreparedRun& run, const Row& row) { return of_motion(run.angle, row); }},
-    {"near the zero of the angle and far from it", false,
+    {"near the zero of the {} and far from it", false,
      [](const PreparedRun& run, const Row& row) { return std::abs(of_motion(run.angle, row)); }},
     {"at low and at high pressure differences", false,
      [](const PreparedRun& run, const Row& row) { return of_pressures(run, row, -1); }},
@@ -123,7 +127,9 @@ class Halving {
       if (is_of_forces(row) && does_[static_cast<Eigen::Index>(i)] != 0)
         values[i] = variable.value(data_.runs[row.run], row);
     }
-    by(variable.where, signs_of(values, variable.about_zero), halves);
+    const bool linear = of_linear_axis(axis_unit("rad", data_.baseline));
+    by(fmt::format(fmt::runtime(variable.where), linear ? "position" : "angle"),
+       signs_of(values, variable.about_zero), halves);
   }
   void by_its_own_sign(std::vector<Halves>& halves) const {
     std::vector<double> values(does_.begin(), does_.end());
@@ -133,7 +139,7 @@ class Halving {
   }
 
  private:
-  void by(const char* where, const Eigen::VectorXd& signs, std::vector<Halves>& halves) const {
+  void by(std::string where, const Eigen::VectorXd& signs, std::vector<Halves>& halves) const {
     const double whole = weighted_.squaredNorm();
     const double up = (signs.array() > 0).select(weighted_, 0).squaredNorm(),
                  down = (signs.array() < 0).select(weighted_, 0).squaredNorm();
@@ -147,7 +153,7 @@ class Halving {
         norm(d.transpose() * d);
     if (variance.rank() == 0) return;
     halves.push_back(
-        {.where = where,
+        {.where = std::move(where),
          .sigma = sigma_of(score.dot(variance.solve(score)), static_cast<double>(variance.rank())),
          .share = std::sqrt(std::max(0.0, score.dot(norm.solve(score))) / whole)});
   }

@@ -14,6 +14,7 @@
 /// Source: a score test of an interaction, Rao 1948; Wilson and Hilferty 1931 for the sigma; docs/derivations/explain.md.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "isac/explain/refine.hpp"
@@ -21,9 +22,9 @@
 namespace isac::explain {
 
 struct Halves {
-  const char* where = "";  ///< "in one direction of motion and in the other"
-  double sigma = 0;        ///< that it differs by; about −1 to 1 where it does not
-  double share = 0;        ///< of the effect, that the difference is worth
+  std::string where;  ///< "in one direction of motion and in the other"
+  double sigma = 0;   ///< that it differs by; about −1 to 1 where it does not
+  double share = 0;   ///< of the effect, that the difference is worth
 };
 
 /// By each thing that may differ, the surest first. `place`: around the fit that names it; `effect`: index in its model's effects.
