@@ -21,7 +21,7 @@ constexpr double kNeither = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNextToNothing = 0.02;  // of the effect's square
 
 /// Something that is high or low, or goes one way or the other.
-struct Variable {
+struct WayToHalve {
   const char* where;  ///< {}: "angle", or "position" of a linear axis
   bool about_zero;    ///< else about the median
   double (*value)(const PreparedRun& run, const Row& row);
@@ -35,7 +35,7 @@ double of_motion(const std::vector<double>& signal, const Row& row) {
   return signal.empty() ? kNeither : signal[row.sample];
 }
 
-constexpr Variable kVariables[] = {
+constexpr WayToHalve kWaysToHalve[] = {
     {"in one direction of motion and in the other", true,
      [](const PreparedRun& run, const Row& row) { return of_motion(run.dry_velocity, row); }},
     {"at low and at high speed", false,
@@ -120,16 +120,16 @@ class Halving {
 
   [[nodiscard]] bool is_nothing() const { return !(weighted_.squaredNorm() > 0); }
 
-  void by(const Variable& variable, std::vector<Halves>& halves) const {
+  void by(const WayToHalve& way, std::vector<Halves>& halves) const {
     std::vector<double> values(data_.rows.size(), kNeither);
     for (std::size_t i = 0; i < values.size(); ++i) {
       const Row& row = data_.rows[i];
       if (is_of_forces(row) && does_[static_cast<Eigen::Index>(i)] != 0)
-        values[i] = variable.value(data_.runs[row.run], row);
+        values[i] = way.value(data_.runs[row.run], row);
     }
     const bool linear = of_linear_axis(axis_unit("rad", data_.baseline));
-    by(fmt::format(fmt::runtime(variable.where), linear ? "position" : "angle"),
-       signs_of(values, variable.about_zero), halves);
+    by(fmt::format(fmt::runtime(way.where), linear ? "position" : "angle"), signs_of(values, way.about_zero),
+       halves);
   }
   void by_its_own_sign(std::vector<Halves>& halves) const {
     std::vector<double> values(does_.begin(), does_.end());
@@ -175,7 +175,7 @@ std::vector<Halves> halves_of(const Around& place, std::size_t effect, int threa
   const Halving halving(place, effect, threads);
   if (halving.is_nothing()) return halves;
   halving.by_its_own_sign(halves);
-  for (const Variable& variable : kVariables) halving.by(variable, halves);
+  for (const WayToHalve& way : kWaysToHalve) halving.by(way, halves);
   std::stable_sort(halves.begin(), halves.end(),
                    [](const Halves& a, const Halves& b) { return a.sigma > b.sigma; });
   return halves;
