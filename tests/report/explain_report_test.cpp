@@ -192,6 +192,9 @@ TEST(ExplainWords, never_say_that_something_is_certain) {
 TEST(ExplainWords, write_equations_with_the_letters_of_the_report) {
   EXPECT_EQ(equation_in_words("-T_c sgn(w)"), "−T_c sgn(φ̇)");
   EXPECT_EQ(equation_in_words("-dI w'"), "−dI φ̈");
+  EXPECT_EQ(equation_in_words("-k3 phi^3"), "−k3 φ³");
+  EXPECT_EQ(equation_in_words("u -> u1 +- x, u <= p_s, -T_c (p_mean/p0)^n sgn(w)"),
+            "u → u1 ± x, u ≤ p_s, −T_c (p_mean/p0)ⁿ sgn(φ̇)");
   EXPECT_EQ(equation_in_words("a sin(2 pi f t + psi)"), "a sin(2 π f t + ψ)");
 }
 

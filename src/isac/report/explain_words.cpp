@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "isac/explain/variable_words.hpp"
@@ -156,8 +159,18 @@ std::string equation_in_words(const std::string& equation) {
   const auto letter = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || (c >= '0' && c <= '9');
   };
+  static constexpr std::pair<std::string_view, std::string_view> kSigns[] = {
+      {"->", "→"}, {"<=", "≤"}, {">=", "≥"}, {"+-", "±"}, {"^2", "²"}, {"^3", "³"}, {"^n", "ⁿ"}};
   std::string out;
   for (std::size_t i = 0; i < equation.size();) {
+    const auto sign = std::find_if(std::begin(kSigns), std::end(kSigns), [&](const auto& s) {
+      return equation.compare(i, s.first.size(), s.first) == 0;
+    });
+    if (sign != std::end(kSigns)) {
+      out += sign->second;
+      i += sign->first.size();
+      continue;
+    }
     if (!letter(equation[i])) {
       out += equation[i] == '-' ? std::string("−") : std::string(1, equation[i]);
       ++i;
