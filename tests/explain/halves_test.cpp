@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -41,7 +43,10 @@ struct Day : test::PreparedDay {
 };
 
 const Halves& in(std::string_view where, const std::vector<Halves>& halves) {
-  return *std::find_if(halves.begin(), halves.end(), [&](const Halves& h) { return h.where == where; });
+  const auto found =
+      std::find_if(halves.begin(), halves.end(), [&](const Halves& h) { return h.where == where; });
+  if (found == halves.end()) throw std::out_of_range(std::string(where));
+  return *found;
 }
 
 constexpr const char* kDirection = "in one direction of motion and in the other";
@@ -88,10 +93,15 @@ TEST(Halves, of_a_friction_that_goes_with_the_pressure_differ_by_pressure) {
 
 TEST(Halves, are_asked_of_no_effect_of_the_valves_nor_of_one_that_does_nothing) {
   Day day({.dry = 0.03});
-  const Hypothesis& friction = day.hypothesis("coulomb_friction");
-  Fit fit = day.baseline;
-  fit.model.effects.push_back({&friction, null_values(friction, friction.shapes.front())});
-  EXPECT_TRUE(day.halves(fit).empty());
+  const Hypothesis &friction = day.hypothesis("coulomb_friction"), &leak = day.hypothesis("leak");
+  const auto with = [&](const Hypothesis& h, const Values& values) {
+    Fit fit = day.baseline;
+    fit.model.effects.push_back({&h, values});
+    return fit;
+  };
+  EXPECT_TRUE(day.halves(with(friction, null_values(friction, friction.shapes.front()))).empty());
+  EXPECT_FALSE(day.halves(with(friction, friction.shapes.front())).empty());
+  EXPECT_TRUE(day.halves(with(leak, leak.shapes.front())).empty());
 }
 
 }  // namespace

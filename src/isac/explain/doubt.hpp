@@ -9,7 +9,8 @@
 ///                 not in the rows
 ///   doubted     it closes less than a quarter of what can be explained there, leaves over what chance seldom does, or in a few moments what noise
 ///                 holds nowhere else, or functions without a name do as well (remainder.cpp), or its numbers speak against its name
-///                 (number_doubts.hpp), or it is not the same in both halves of something (halves.hpp), or held-out runs, alone or with the fitted ones, leave over what chance seldom does (left_over.hpp)
+///                 (number_doubts.hpp), or it is not the same in both halves of something (halves.hpp), or held-out runs, alone or with the
+///                 fitted ones, leave over what chance seldom does (left_over.hpp)
 ///   not none    rms on held-out runs > 1.35 times that on fitted ones, freed of a zero that wanders too, or a few moments that hold what noise holds
 ///                 nowhere else (moments.hpp), or slow noise that is none: by its steps a zero (memory 100 s) that would wander by more than 1.5
 ///                 times the rms, or steps from one bin of 2 s to the next of eight times the mean square of the median run

@@ -60,14 +60,13 @@ void add_widths(const Predictor& predictor, const Eigen::VectorXd& left, Chain c
   const Label label = label_of(data, chain);
   const auto say = [&](const Width& w, const char* variable) {
     if (!std::isfinite(w.low)) return;
-    const double change = (w.high - w.low) / std::max(std::abs(w.low), std::abs(w.high));
+    const double low = std::abs(w.low), high = std::abs(w.high), change = (high - low) / std::max(low, high);
     c.evidence.push_back(
         {true,
          fmt::format("Without it the residual makes a loop over the direction of motion, {} {} wide on "
                      "either side in the third of the rows with the lowest {}, {} in the third with the "
                      "highest: {}.",
-                     rounded(std::abs(w.low) * label.scale, 2), label.unit, variable,
-                     rounded(std::abs(w.high) * label.scale, 2),
+                     rounded(low * label.scale, 2), label.unit, variable, rounded(high * label.scale, 2),
                      change > 0.25    ? "it grows"
                      : change < -0.25 ? "it shrinks"
                                       : "it stays")});

@@ -8,8 +8,8 @@
 ///
 /// q: the effect's free parameters, each of which may be another in either half; x: all that it does. A share of 0.04 closes what 4 % of the effect would.
 /// A half is cut at the median of the rows that the effect changes; what is at rest is in neither direction. A half that holds next to nothing of the
-/// effect says nothing. Only rows of forces and of the motion are asked: what valves do at their steps is held against any valve (any_valve.hpp), which
-/// finds what halves would call a difference and is the model's own error there. Nor is an effect asked whose states are read off the data.
+/// effect says nothing. Only rows of forces and of the motion are asked: right names of valves differ between rows near a step of the reference and
+/// far from it by far more than noise, and are held against any valve instead (any_valve.hpp). Nor is an effect asked whose states are read off the data.
 /// Units: shares, sigma. Threads: uses up to `threads`. Errors: none; empty where nothing is to be asked.
 /// Source: a score test of an interaction, Rao 1948; Wilson and Hilferty 1931 for the sigma; docs/derivations/explain.md.
 #pragma once

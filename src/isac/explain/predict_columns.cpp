@@ -9,7 +9,8 @@
 namespace isac::explain {
 namespace {
 
-/// The columns that were asked for last, of each run. A search moves amplitudes more often than shapes, and two or three effects at a time.
+/// The columns that were asked for last, of each run. A search moves amplitudes more often than shapes, and two or three effects at a time; all of
+/// these are asked for by each prediction, so the one that was not asked for longest goes first.
 template <typename Part>
 class LastAsked {
  public:
@@ -40,10 +41,6 @@ class LastAsked {
   std::uint64_t now_ = 0;
 };
 
-bool is_amplitude(const models::EffectInfo& info, std::size_t parameter) {
-  return !std::isnan(info.parameters[parameter].null_value);
-}
-
 }  // namespace
 
 bool Predictor::has_columns(const Hypothesis& effect, bool motion) const noexcept {
@@ -70,18 +67,17 @@ std::shared_ptr<const Predictor::Columns> Predictor::columns_of(const ModelPoint
                                                                 std::size_t index, const Inputs& in,
                                                                 bool motion) const {
   const Hypothesis& h = *a.hypothesis;
-  const models::EffectInfo& info = h.info();
-  const auto count = static_cast<std::size_t>(info.parameter_count);
+  const auto count = static_cast<std::size_t>(h.info().parameter_count);
   std::vector<double> key = {static_cast<double>(in.identity), static_cast<double>(h.effect),
                              h.clock == Clock::kDay ? 1.0 : 0.0, motion ? 1.0 : 0.0};
   for (std::size_t i = 0; i < count; ++i)
-    if (!is_amplitude(info, i)) key.push_back(a.values[i]);
+    if (!h.amplitude[i]) key.push_back(a.values[i]);
   thread_local LastAsked<Columns> last;
   return last.of(index, key, [&] {
     auto made = std::make_shared<Columns>();
     std::vector<Values> ones;
     for (std::size_t i = 0; i < count; ++i) {
-      if (!is_amplitude(info, i)) continue;
+      if (!h.amplitude[i]) continue;
       made->amplitudes.push_back(i);
       ones.push_back(null_values(h, a.values));
       ones.back()[i] = 1;
