@@ -1,24 +1,24 @@
 /// @file
-/// Single samples that stand out of what a model leaves over: spikes of a reading.
+/// Single samples that stand out of their neighbours: spikes of a reading.
 ///
-///   d_k = x_k − (x_{k−1} + x_{k+1})/2,   outlier: |d_k| > limit, its neighbours on one side of it and near each other,
+///   d_k = x_k − Σ_j w_j (x_{k−j} + x_{k+j}),  w = (3, 3/2, −1)/7: what any cubic passes;   outlier: |d_k| > limit, its neighbours near each
+///     other but for a slope, |x_{k+1} − x_{k−1} − (x_{k+3} − x_{k−3})/3| < |d|/2, and on one side of it,
 ///     |(x_{k−1} + x_{k+1} − x_{k−2} − x_{k+2})/2| < |d|/2: where a command jumps, a smoothed pressure rounds the torque's corner, which is no spike
 ///   limit = max(q98 (ln(N/α)/ln 50)^(1/(0.96 k)), 6.5 s, 3 quanta),  k = ln(ln 50/ln 10)/ln(q98/q90), 0.5 ≤ k ≤ 1.6
 ///
 /// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: the tail ln(1/S) = (x/a)^k that passes through both is continued
 /// to where one of N samples passes with probability α (k is 1 for Laplace's noise, 1.5 here for normal noise, whose own tail is thinner
-/// still). First, where 25 or more pass 6.5 s (or 3 quanta) and the tail holds a twenty-fifth of them there at most, that is the limit. Else what
-/// passes holds a quarter of s for sure, or is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5,
+/// still). First, the nearest limit from 5.5 s (and 3 quanta) on that 25 or more pass, of which the tail holds a twenty-fifth at most (a tenth below
+/// 6.5 s), is the limit. Else what passes holds a quarter of s for sure, or is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5,
 /// q98/ln 50), and 8 s at least: steps of a converter bend a tail the other way. Five must pass before they count as spikes (raw_effects.cpp). s is the standard deviation of white
 /// noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
 /// Units: the signal's. Threads: pure. Errors: none.
 /// Source: docs/derivations/explain.md.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
-
-#include "isac/explain/spectrum.hpp"
 
 namespace isac::explain {
 
@@ -29,9 +29,12 @@ struct Outliers {
   double rms = 0;     ///< √(Σ d²/N) over the outliers: what they add to the residual
 };
 
-/// Outliers of all series together; `quantum` is the smallest change of the reading (0: none).
-[[nodiscard]] Outliers find_outliers(std::span<const Series> runs, double quantum = 0);
+/// At an even rate; samples that are not to be used are NaN.
+using Readings = std::span<const std::vector<double>* const>;
+
+/// Outliers of all readings together; `quantum` is the smallest change of the reading (0: none).
+[[nodiscard]] Outliers find_outliers(Readings readings, double quantum = 0);
 /// Those beyond a limit that is known already.
-[[nodiscard]] Outliers count_outliers(std::span<const Series> runs, double limit);
+[[nodiscard]] Outliers count_outliers(Readings readings, double limit);
 
 }  // namespace isac::explain

@@ -87,17 +87,31 @@ double taken_by_line(const SpectralLine& line, const std::vector<Series>& runs) 
   return count > 0 ? squares / count : 0.0;
 }
 
-double taken_by_limit(double limit, const std::vector<Series>& runs) {
-  const Outliers o = count_outliers(runs, limit);
-  return o.rms * o.rms;
+/// The readings whose single samples may be spikes: both forces, else the torque's residual.
+struct Read {
+  std::vector<const std::vector<double>*> readings;
+  double of_torque = 1;  ///< mean square in the torque for a mean square over the readings
+};
+
+Read readings_of(const std::vector<Series>& runs, double wheel_radius) {
+  Read read;
+  for (const Series& run : runs)
+    for (const std::vector<double>& force : run.force)
+      if (!force.empty()) read.readings.push_back(&force);
+  if (!read.readings.empty()) {
+    read.of_torque = 2 * wheel_radius * wheel_radius;  // two readings for each sample of the torque
+    return read;
+  }
+  for (const Series& run : runs) read.readings.push_back(&run.value);
+  return read;
 }
 
-double quantum_of(const Prepared& data) {
+double quantum_of(const Read& read) {
   double least = std::numeric_limits<double>::infinity();
-  for (const PreparedRun& run : data.runs)
-    for (std::size_t k = 1; k < run.torque.size(); ++k) {
-      const double change = std::abs(run.torque[k] - run.torque[k - 1]);
-      if (change > 1e-9 * std::abs(run.torque[k]) && change > 0) least = std::min(least, change);
+  for (const std::vector<double>* x : read.readings)
+    for (std::size_t k = 1; k < x->size(); ++k) {
+      const double change = std::abs((*x)[k] - (*x)[k - 1]);
+      if (change > 1e-9 * std::abs((*x)[k]) && change > 0) least = std::min(least, change);
     }
   return std::isfinite(least) ? least : 0.0;
 }
@@ -147,25 +161,34 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
       const double turn = 2 * kPi * line.frequency * data.smoothing.motion;
       if (turn < 1.5) all.push_back(hum_or_disturbance(predictor, line, Chain::kMotion));
     }
-  const Outliers spikes = find_outliers(torque, quantum_of(data));
-  if (data.baseline.terms.empty() && std::isfinite(data.rig.wheel_radius) && spikes.count >= kFewestSpikes) {
-    RawEffect effect;
-    effect.candidate = candidate_of("spikes");
-    effect.rms = spikes.rms;
-    effect.p_value = 0.001;
-    const double count = static_cast<double>(spikes.count), n = static_cast<double>(spikes.samples);
-    // Either of two sensors may jump.
-    set(effect.candidate.parameters[0], 0.5 * count / n, 0.5 * std::sqrt(count) / n);
-    set(effect.candidate.parameters[1], spikes.height / data.rig.wheel_radius, kNotKnown);
-    effect.candidate.evidence.push_back(
-        {true,
-         fmt::format("{} single samples of {} stand {} N m or more beside both neighbours, {} N m in the "
-                     "middle; noise with the residual's own tails leaves hardly any.",
-                     spikes.count, spikes.samples, rounded(spikes.limit), rounded(spikes.height))});
-    const double limit = spikes.limit;
-    effect.taken = [limit](const std::vector<Series>& runs) { return taken_by_limit(limit, runs); };
-    all.push_back(std::move(effect));
-  }
+  const double radius = data.rig.wheel_radius;
+  if (!data.baseline.terms.empty() || !std::isfinite(radius)) return all;
+  const Read read = readings_of(torque, radius);
+  const Outliers spikes = find_outliers(read.readings, quantum_of(read));
+  if (spikes.count < kFewestSpikes) return all;
+  const bool of_forces = !torque.front().force[0].empty();
+  const double newton = of_forces ? 1 : 1 / radius;
+  RawEffect effect;
+  effect.candidate = candidate_of("spikes");
+  effect.rms = std::sqrt(read.of_torque) * spikes.rms;
+  effect.p_value = 0.001;
+  const double count = static_cast<double>(spikes.count), n = static_cast<double>(spikes.samples);
+  // Of a torque's samples either of two sensors may have made one.
+  const double sensors = of_forces ? 1 : 2;
+  set(effect.candidate.parameters[0], count / n / sensors, std::sqrt(count) / n / sensors);
+  set(effect.candidate.parameters[1], newton * spikes.height, kNotKnown);
+  effect.candidate.evidence.push_back(
+      {true,
+       fmt::format("{} single samples of {} stand {} {} or more off their neighbours, {} {} in the "
+                   "middle; noise with the {} own tails leaves hardly any.",
+                   spikes.count, spikes.samples, rounded(spikes.limit), of_forces ? "N" : "N m",
+                   rounded(spikes.height), of_forces ? "N" : "N m", of_forces ? "readings'" : "residual's")});
+  effect.taken = [limit = spikes.limit, radius](const std::vector<Series>& runs) {
+    const Read there = readings_of(runs, radius);
+    const Outliers o = count_outliers(there.readings, limit);
+    return there.of_torque * o.rms * o.rms;
+  };
+  all.push_back(std::move(effect));
   return all;
 }
 

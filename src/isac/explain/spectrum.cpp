@@ -337,6 +337,9 @@ std::vector<Series> residual_series(const Predictor& predictor, const ModelPoint
       };
       for (std::size_t k = first; k < last; ++k)
         s.value.push_back(mask[k] != 0 ? measured[k] - predicted[k] : std::nan(""));
+      for (int i = 0; i < 2 && chain == Chain::kTorque && !run.force[0].empty() && !run.force[1].empty(); ++i)
+        for (std::size_t k = first; k < last; ++k)
+          s.force[i].push_back(mask[k] != 0 ? run.force[i][k] : std::nan(""));
       for (const std::vector<double>& u : run.command)
         if (!u.empty()) s.drivers.push_back(cut(u));
       // A joint that is free answers to what disturbs it: only the command tells what was asked of it.
