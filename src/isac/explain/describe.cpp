@@ -235,7 +235,7 @@ std::string change_sentence(const BaseChange& change, const std::string& effect)
 }
 
 std::string how_much_worse(double sigma) {
-  constexpr double kAsWell = 0.01;
+  constexpr double kAsWell = 0.3;
   return sigma < kAsWell ? "fits as well" : fmt::format("fits only {} sigma worse", rounded(sigma, 2));
 }
 

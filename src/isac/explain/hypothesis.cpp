@@ -105,7 +105,7 @@ Hypothesis make_hypothesis(int effect, const Reach& reach) {
   if (string_view(info.id) == "stribeck_friction")
     h.upper[2] = std::clamp(0.3 * reach.speed, 2 * h.lower[2], h.upper[2]);
   // Beyond the kernel of the motion's rows s − φ̈ is the fourth derivative of the encoder's noise, whose second is in the residual.
-  if (string_view(info.id) == "series_elasticity_within") h.upper[1] = 18;
+  if (string_view(info.id) == "series_elasticity_within") h.upper[1] = 24;
   // What is damped more has no resonance that would tell it from an inertia, or from a lag.
   if (h.id() == "series_elasticity") h.upper[2] = 0.7;
   h.dry = jumps_with_direction(effect, info);

@@ -54,6 +54,7 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                                               {"encoder_slip", "torque_offset"},
                                               {"encoder_drift", "encoder_offset"},
                                               {"thermal_drift", "torque_offset"},
+                                              {"thermal_drift", "encoder_offset"},
                                               {"thermal_drift", "encoder_drift"},
                                               {"thermal_drift", "force_drift"},
                                               {"gravity_imbalance", "torque_offset"},

@@ -26,6 +26,9 @@ constexpr double kCloserThanChance = 1.28;
 // Of what a name closes, in units of noise: no equation is truer than that. Of names that functions came close to, a right one on a clear day had 0.003,
 // five wrong ones 0.017 and more.
 constexpr double kWorthComparing = 0.01;
+// Of it, what a rival that is ahead may have beyond a name without taking it away: functions 0.0045 beyond a lag of the force amplifiers that closed
+// 83 sigma beside a wandering zero, any valve 0.00026 beyond a dead time with a limit of the flow.
+constexpr double kHardlyAny = 0.005, kHardlyAnyOfValve = 0.0005;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kSeldom = 0.005;
@@ -167,7 +170,8 @@ void Search::hold_against_a_drift(const Around& baseline) {
                   std::abs(behind.t), behind.t > 0 ? "ahead" : "behind", behind.separation));
 }
 
-bool Search::are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of) {
+bool Search::are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of,
+                        const Closed& closed) {
   std::string names;
   for (std::size_t i = 0; i < found_.added.size(); ++i)
     names += (i > 0 ? " and " : "") + ranking_.id_of(found_.steps[i].trials.front());
@@ -176,6 +180,15 @@ bool Search::are_beaten(const Comparison& behind, const std::string& rivals, con
     say(fmt::format("{}: {}{} {} ({:.1f} sigma of data between them)", names, rivals, made_of,
                     alike ? "leaves the same" : "is " + sigma_ahead(behind), behind.separation));
     return false;
+  }
+  const double share = behind.separation * behind.separation / closed.units;
+  if (share < closed.hardly_any) {
+    found_.doubts.push_back(fmt::format(
+        "{} is {:.1f} sigma ahead, and differs from it by {:.2g} of what it closes: that may be an error of "
+        "its equation, or it may be something that is nearly like it.",
+        upper_first(rivals), behind.t, share));
+    say(names + ": " + found_.doubts.back());
+    return true;
   }
   const std::string sentence = fmt::format("ruled out: {:.1f} sigma behind {}", behind.t, rivals);
   for (std::size_t i = 0; i < found_.added.size(); ++i)
@@ -205,9 +218,10 @@ void Search::hold_against_functions(const Around& baseline) {
         "Together they do no more than one function without a name ({:.1f} sigma of data between them): it "
         "may be one thing, and neither of them.",
         behind.separation));
-  if (are_beaten(behind, "a fit without a name", " (" + names_of(generic, data_) + ")")) return;
-  const double closed = (baseline.residual.squaredNorm() - left.squaredNorm()) / behind.unit,
-               between = behind.separation * behind.separation;
+  const double closed = (baseline.residual.squaredNorm() - left.squaredNorm()) / behind.unit;
+  if (are_beaten(behind, "a fit without a name", " (" + names_of(generic, data_) + ")", {closed, kHardlyAny}))
+    return;
+  const double between = behind.separation * behind.separation;
   if (!alike && between >= kWorthComparing * closed && behind.t > kCloserThanChance - 0.5 * behind.separation)
     found_.doubts.push_back(
         fmt::format("Functions without a name do as well, or nearly: they are {}, where {:.1f} sigma "
@@ -253,8 +267,9 @@ void Search::hold_against_any_valve() {
     found_.adequate = !is_open(found_.steps.back());
     return;
   }
+  const double closed = found_.baseline.residual.squaredNorm() - found_.model.residual.squaredNorm();
   for (const Asked& asked : named)
-    if (are_beaten(asked.behind, asked.rival)) return;
+    if (are_beaten(asked.behind, asked.rival, "", {closed / asked.behind.unit, kHardlyAnyOfValve})) return;
 }
 
 void Search::hold_against_itself(const Around& baseline) {

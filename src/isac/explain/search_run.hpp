@@ -208,8 +208,13 @@ class Search {
   /// What stands for the valve unit's dynamics may be another lag, or another curve, with no name; a rival of the name that is such a one takes
   /// its place.
   void hold_against_any_valve();
-  /// Rules the names out where rivals without a name are ahead of them.
-  bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of = "");
+  /// What the names close, in units of noise, and the share of it that a rival may have beyond them without taking them away.
+  struct Closed {
+    double units = 0, hardly_any = 0;
+  };
+  /// Rules the names out where rivals without a name are ahead of them, or doubts them where these have hardly any of what they close beyond them.
+  bool are_beaten(const Comparison& behind, const std::string& rivals, const std::string& made_of,
+                  const Closed& closed);
   /// What moves with the time of the day may have happened at once, between two runs.
   void hold_against_a_step(const Around& baseline);
   /// And what is said to have happened at once may have gone on all day, where no drift with a name says so.

@@ -61,7 +61,8 @@ std::vector<double> grid_of(string_view id, int at, const Reach& r) {
   if (id == "thermal_drift" && at == 3) return {30, 150, 600, 3000};
   if (id == "series_elasticity" && at == 1) return {5, 7, 10, 14, 20, 28, 40};
   // What rings is found within its width only, 2 d f.
-  if (id == "series_elasticity_within" && at == 1) return {6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16.5};
+  if (id == "series_elasticity_within" && at == 1)
+    return {6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16.5, 18, 20, 22};
   if (one_of(id, {"series_elasticity", "series_elasticity_within"}) && at == 2) return {0.05};
   if (one_of(id, {"backlash", "backlash_of_wheel"}) && at == 0) return {0.003, 0.015};
   if (id == "encoder_play" && at == 0) return {0.001, 0.004};

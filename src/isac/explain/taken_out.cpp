@@ -43,6 +43,10 @@ double missed_by(const Predictor& predictor, const Found& found, std::size_t eff
       .separation;
 }
 
+bool is_told_by_few_sigma(const Candidate& effect) {
+  return effect.missed_by < kFewSigmaOfData;
+}
+
 std::string told_by_few_sigma(const std::vector<Candidate>& effects) {
   const Candidate* fewest = nullptr;
   for (const Candidate& c : effects)

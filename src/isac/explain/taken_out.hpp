@@ -33,6 +33,8 @@ struct TakenOut {
 /// s; all else is fitted anew.
 [[nodiscard]] double missed_by(const Predictor& predictor, const Found& found, std::size_t effect);
 
+/// Do these recordings hold so little of it that something like it would do as well?
+[[nodiscard]] bool is_told_by_few_sigma(const Candidate& effect);
 /// Why the one of fewest sigma may be another than its name says, though nothing of the catalogue is as good; empty: all are large enough.
 [[nodiscard]] std::string told_by_few_sigma(const std::vector<Candidate>& effects);
 
