@@ -239,6 +239,13 @@ std::string how_much_worse(double sigma) {
   return sigma < kAsWell ? "fits as well" : fmt::format("fits only {} sigma worse", rounded(sigma, 2));
 }
 
+/// Outliers close it, unequal muscles too; a friction closes it.
+const char* close_or_closes(const std::vector<Candidate>& effects) {
+  const bool many =
+      effects.size() > 1 || effects.front().id == "spikes" || effects.front().id == "muscle_asymmetry";
+  return many ? "close" : "closes";
+}
+
 std::string summary_of(const Explanation& e) {
   switch (e.verdict) {
     case Verdict::kNone:
@@ -256,9 +263,9 @@ std::string summary_of(const Explanation& e) {
         text += " No effect of the catalogue explains it";
       } else {
         text += fmt::format(
-            " {} closes part of it ({}), but something significant is left that no effect of "
+            " {} {} part of it ({}), but something significant is left that no effect of "
             "the catalogue explains",
-            upper_first(joined(terms_of(e.effects, 3))), closing(e));
+            upper_first(joined(terms_of(e.effects, 3))), close_or_closes(e.effects), closing(e));
       }
       if (e.unknown && !e.unknown->depends_on.empty())
         text += "; it depends on " +
@@ -276,8 +283,8 @@ std::string summary_of(const Explanation& e) {
                                   one ? "is" : "are", e.withheld);
       }
       if (e.effects.size() == 1) {
-        text += fmt::format(" {}, {}, closes it: {}.", upper_first(e.effects.front().name),
-                            numbers_of(e.effects.front()), closing(e));
+        text += fmt::format(" {}, {}, {} it: {}.", upper_first(e.effects.front().name),
+                            numbers_of(e.effects.front()), close_or_closes(e.effects), closing(e));
       } else {
         text += fmt::format(" {} close it together: {}.", upper_first(joined(terms_of(e.effects, 4))),
                             closing(e));
@@ -298,7 +305,7 @@ std::string summary_of(const Explanation& e) {
       std::vector<std::string> names = terms_of(e.effects, 3), rivals = terms_of(e.alternatives, 3);
       std::string text = missed(e);
       if (names.empty()) return text + " These data cannot tell what is missing.";
-      const char* close = names.size() > 1 ? "close" : "closes";
+      const char* close = close_or_closes(e.effects);
       if (e.alternatives.size() == 1 && e.alternatives.front().id == "unknown")
         return text + fmt::format(" {} {} it ({}), but it may also be none of the catalogue. {}",
                                   upper_first(joined(names)), close, closing(e),

@@ -112,7 +112,9 @@ Outliers find_outliers(Readings readings, double quantum) {
   std::sort(heights.begin(), heights.end());
   const auto beyond = [&](double limit) {
     const auto first = std::upper_bound(heights.begin(), heights.end(), limit);
-    return outliers_of(std::span(first, heights.end()), limit, samples);
+    Outliers out = outliers_of(std::span(first, heights.end()), limit, samples);
+    out.among_noise = out.count > 0 && out.height < kFarOut * white;
+    return out;
   };
   if (size.size() < 1000) return {};
   const double n = static_cast<double>(size.size());

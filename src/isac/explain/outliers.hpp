@@ -27,6 +27,8 @@ struct Outliers {
   double height = 0;  ///< median |d| of the outliers
   double limit = 0;   ///< beyond which a sample is one
   double rms = 0;     ///< √(Σ d²/N) over the outliers: what they add to the residual
+  bool among_noise =
+      false;  ///< found where the noise itself still reaches: of the smaller ones most are not counted
 };
 
 /// At an even rate; samples that are not to be used are NaN.

@@ -175,7 +175,8 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
   const double count = static_cast<double>(spikes.count), n = static_cast<double>(spikes.samples);
   // Of a torque's samples either of two sensors may have made one.
   const double sensors = of_forces ? 1 : 2;
-  set(effect.candidate.parameters[0], count / n / sensors, std::sqrt(count) / n / sensors);
+  set(effect.candidate.parameters[0], count / n / sensors,
+      spikes.among_noise ? kNotKnown : std::sqrt(count) / n / sensors);
   set(effect.candidate.parameters[1], newton * spikes.height, kNotKnown);
   effect.candidate.evidence.push_back(
       {true,
@@ -183,6 +184,9 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
                    "middle; noise with the {} own tails leaves hardly any.",
                    spikes.count, spikes.samples, rounded(spikes.limit), of_forces ? "N" : "N m",
                    rounded(spikes.height), of_forces ? "N" : "N m", of_forces ? "readings'" : "residual's")});
+  if (spikes.among_noise)
+    effect.candidate.evidence.push_back(
+        {false, "Smaller ones hide in the noise: there are more of them, and smaller, than these."});
   effect.taken = [limit = spikes.limit, radius](const std::vector<Series>& runs) {
     const Read there = readings_of(runs, radius);
     const Outliers o = count_outliers(there.readings, limit);
