@@ -38,19 +38,22 @@ bool Search::is_convention(const Step& step) {
     if (std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
                     [&](const Hypothesis& h) { return h.id() == id && h.upper[0] > 0; }))
       continue;
+    std::string what;
     if (id == "encoder_offset" && near(std::abs(t.values[0]) / step_angle, 0.5, kConvention)) {
       tolerate(library_, data_, id, -0.5 * step_angle, 0.5 * step_angle);
+      what = fmt::format("{:.3g} rad, half a step", t.values[0]);
     } else if (const double within =
                    std::min(kConventionOfTime + kErrorsOfTime / std::sqrt(std::max(1.0, units_closed(t))),
                             kMostOfTime);
                id == "dead_time" &&
                (near(t.values[0] / interval, 0.5, within) || near(t.values[0] / interval, 1, within))) {
       tolerate(library_, data_, id, -interval, interval);
+      what =
+          fmt::format("{:.3g} s, {} sample", t.values[0], t.values[0] < 0.75 * interval ? "half a" : "one");
     } else {
       continue;
     }
-    const std::string sentence =
-        fmt::format("of {:.3g} it is how the recorder counts, and is left to that", t.values[0]);
+    const std::string sentence = "of " + what + ", " + kLeftToTheRecorder;
     found_.notes.push_back({id, sentence});
     say(id + ": " + sentence);
     found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);

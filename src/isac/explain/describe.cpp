@@ -8,6 +8,7 @@
 #include "isac/explain/labels.hpp"
 #include "isac/explain/uncertainty.hpp"
 #include "isac/explain/variable_words.hpp"
+#include "isac/models/effects.hpp"
 
 namespace isac::explain {
 namespace {
@@ -195,6 +196,20 @@ std::string largest_hidden(const Explanation& e) {
   return fmt::format(" What could hide most is {}, up to {}.", most.id, with_unit(most.size, most.unit));
 }
 
+/// What is there and was taken for how the recorder counts; who knows that it does not count so knows what it is.
+std::string left_to_the_recorder(const Explanation& e) {
+  std::string text;
+  for (const TrialNote& note : e.trials) {
+    const std::size_t at = note.sentence.find(kLeftToTheRecorder);
+    if (at == std::string::npos) continue;
+    const auto& info = models::effect_catalogue()[static_cast<unsigned>(models::find_effect(note.id))];
+    const std::string one = fmt::format(" {}, {}is taken for how the recorder counts.",
+                                        upper_first(info.term), note.sentence.substr(0, at));
+    if (text.find(one) == std::string::npos) text += one;  // a search that began anew found it twice
+  }
+  return text;
+}
+
 /// Every unit that the catalogue or a variable brought along, as it is on this axis.
 void tell_in_units_of(const BaselineModel& baseline, Explanation& e) {
   const auto mend = [&](std::string& unit) { unit = axis_unit(unit, baseline); };
@@ -339,7 +354,7 @@ void describe(const Predictor& predictor, const Library& library, const Found& f
     }
   }
   add_evidence(predictor, library, found, e);
-  e.summary = summary_of(e);
+  e.summary = summary_of(e) + left_to_the_recorder(e);
 }
 
 }  // namespace isac::explain

@@ -143,6 +143,8 @@ struct RunTrace {
 struct TrialNote {
   std::string id, sentence;
 };
+/// How the sentence of a trial ends that is no effect.
+inline constexpr const char* kLeftToTheRecorder = "it is how the recorder counts, and is left to that";
 
 struct Explanation {
   Verdict verdict = Verdict::kNone;
