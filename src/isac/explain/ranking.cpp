@@ -23,6 +23,10 @@ constexpr double kLimitReach =
 
 }  // namespace
 
+bool Ranking::touches_pressures(const Trial& t) const {
+  return (library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains & kPressureChains) != 0;
+}
+
 int Ranking::parameters_of(const Trial& t) const {
   const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
   // Between two runs there is one moment, within a run the best of many.
@@ -120,10 +124,14 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
   for (bool changed = true; changed && changes < trials.size();) {
     changed = false;
     for (std::size_t i = 1; i < trials.size(); ++i) {
-      const bool twins = trials[i].behind.separation < kTwinLimit;
+      const double apart = trials[i].behind.separation,
+                   closed = (before.squaredNorm() - trials[0].loss) / trials[i].behind.unit,
+                   hardly_any = touches_pressures(trials[0]) ? 0 : kHardlyAny * closed;
+      const bool twins = apart < kTwinLimit;
       const bool simpler =
           nests(id_of(trials[0]), id_of(trials[i])) &&
           (trials[i].behind.t < kNestedLimit || twins ||
+           (apart * apart < hardly_any && trials[i].behind.t < kLimitReach) ||
            (trials[i].behind.t < kLimitReach && is_limit_case(trials[0].hypothesis, trials[0].values)));
       const int more = parameters_of(trials[i]) - parameters_of(trials[0]);
       const bool likelier =

@@ -28,7 +28,8 @@ constexpr double kCloserThanChance = 1.28;
 constexpr double kWorthComparing = 0.01;
 // Of it, what a rival that is ahead may have beyond a name without taking it away: functions 0.0045 beyond a lag of the force amplifiers that closed
 // 83 sigma beside a wandering zero, any valve 0.00026 beyond a dead time with a limit of the flow.
-constexpr double kHardlyAny = 0.005, kHardlyAnyOfValve = 0.0005;
+// (kHardlyAny, ranking.hpp.)
+constexpr double kHardlyAnyOfValve = 0.0005;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
 constexpr double kSeldom = 0.005;

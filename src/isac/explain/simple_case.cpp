@@ -51,7 +51,10 @@ void Search::hold_against_its_simple_case() {
     const Comparison behind =
         compare(data_, found_.model.residual, fit.residual, held.parameters() - general.parameters(),
                 noise_density(data_, found_.model.residual));
-    const bool alike = behind.separation < kTwinLimit;
+    const double closed =
+        (found_.baseline.residual.squaredNorm() - found_.model.residual.squaredNorm()) / behind.unit;
+    const bool alike =
+        behind.separation < kTwinLimit || behind.separation * behind.separation < kHardlyAny * closed;
     say(fmt::format("{}: its simple case is {:.1f} sigma behind ({:.1f} sigma of data between them)",
                     general.id(), told_behind(behind), behind.separation));
     if (!alike && behind.t >= kLeadsBy) continue;
