@@ -202,7 +202,21 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"leave-one-out", "real", "force_gain_error", "9308", R"("verdict":"not_separable")",
              "a zero of the force, which left over 0.096 of its own 2.7 floors"},
         Miss{"leave-one-out", "quantised", "asymmetric_hysteresis", "9309", R"("verdict":"not_separable")",
-             "a hysteresis that is the same in both directions, beside a zero that wanders"}));
+             "a hysteresis that is the same in both directions, beside a zero that wanders"},
+        Miss{"clear", "white", "coulomb_friction", "9311", R"("effects":[{"id":"coulomb_friction")",
+             "a friction that falls from rest, by a thousandth of what it closes"},
+        Miss{"leave-one-out", "white", "coulomb_friction", "9311", R"("verdict":"not_separable")",
+             "a friction that falls from rest, by a thousandth of what it closes"},
+        Miss{"faint", "white", "spikes", "9310", R"("effects":[{"id":"spikes")",
+             "nothing, for they are two to four deviations of the torque's noise"},
+        Miss{"faint", "real", "spikes", "9310", R"("effects":[{"id":"spikes")",
+             "nothing, for they were looked for in the torque"},
+        Miss{"faint", "coloured", "series_elasticity", "9310", R"("effects":[{"id":"series_elasticity")",
+             "an inertia, for it rings at 19 Hz, which was beyond the range"},
+        Miss{"faint", "quantised", "sensor_lag", "9310", R"("effects":[{"id":"sensor_lag")",
+             "unknown, for functions without a name were ahead by half a hundredth of it"},
+        Miss{"faint", "coloured", "stribeck_friction", "9310", R"("alternatives":[{"id":"stribeck_friction")",
+             "Coulomb's friction, beside which its fall from rest was not needed"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's
@@ -343,7 +357,12 @@ INSTANTIATE_TEST_SUITE_P(
                  "pressure_offset,pressure_gain_error",
                  "7719594048552449253",
                  {"pressure_offset", "pressure_gain_error"},
-                 "zeros of both sensors, which a valve's and one sensor's are too"}));
+                 "zeros of both sensors, which a valve's and one sensor's are too"},
+        PairMiss{"quantised",
+                 "dead_time,flow_limit",
+                 "7748310168227296316",
+                 {"dead_time", "flow_limit"},
+                 "unknown, for any lag was ahead of both by 0.0003 of what they close"}));
 
 /// What isac-explain says, its words one space apart, of a clear slip in white noise; `without`: held-out runs that are not handed to it.
 std::string said_of_slip(const std::string& seed, const std::string& without = "") {
