@@ -111,6 +111,36 @@ void keep_general_cases(const Library& library, const std::vector<Trial>& trials
   }
 }
 
+/// A hysteresis and an offset, named together, are what a hysteresis that differs by direction is, with one width: it stays in the set.
+void keep_what_both_are(const Library& library, const Found& found, Explanation& e) {
+  constexpr double kOneInThree = 1.0 / 3;
+  const auto named = [&](const std::string& id) {
+    return std::find_if(e.effects.begin(), e.effects.end(), [&](const Candidate& c) { return c.id == id; });
+  };
+  const auto loop = named("hysteresis");
+  const bool offset = named("torque_offset") != e.effects.end() || named("encoder_offset") != e.effects.end();
+  if (loop == e.effects.end() || !offset) return;
+  const std::string both = "asymmetric_hysteresis";
+  const auto is = [&](const Candidate& other) { return other.id == both; };
+  const auto general = std::find_if(library.hypotheses.begin(), library.hypotheses.end(),
+                                    [&](const Hypothesis& h) { return h.id() == both; });
+  if (general == library.hypotheses.end() || std::any_of(e.alternatives.begin(), e.alternatives.end(), is))
+    return;
+  Trial trial;  // as it was refitted, where it was; without numbers else
+  trial.hypothesis = static_cast<int>(general - library.hypotheses.begin());
+  bool refitted = false;
+  for (const Trial& t : found.steps[static_cast<std::size_t>(loop - e.effects.begin())].trials)
+    if (library.hypotheses[static_cast<std::size_t>(t.hypothesis)].id() == both && !refitted) {
+      trial = t;
+      refitted = true;
+    }
+  Candidate c = candidate_of(library, trial, kOneInThree * loop->confidence);
+  if (!refitted) c.parameters.clear();
+  std::erase_if(e.rejected, is);
+  loop->confidence -= c.confidence;
+  e.alternatives.push_back(std::move(c));
+}
+
 void check_terms(const BaselineModel& baseline) {
   for (const std::string& term : baseline.terms)
     if (models::find_effect(term) < 0)
@@ -392,6 +422,7 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
     if (std::string why = told_by_few_sigma(e.effects); !why.empty()) found.doubts.push_back(std::move(why));
     for (std::size_t i = 0; i < e.effects.size(); ++i)
       if (is_told_by_few_sigma(e.effects[i])) keep_general_cases(library, found.steps[i].trials, i, e);
+    keep_what_both_are(library, found, e);
     if (e.gap.heldout_after > kFurtherOff * e.gap.heldout_before && found.steps.front().units < kFew)
       found.doubts.push_back(
           fmt::format("On held-out runs the {} is {:.3g} {} off with it and {:.3g} {} without: only freed of "
