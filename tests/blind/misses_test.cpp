@@ -215,8 +215,9 @@ INSTANTIATE_TEST_SUITE_P(
              "an inertia, for it rings at 19 Hz, which was beyond the range"},
         Miss{"faint", "quantised", "sensor_lag", "9310", R"("effects":[{"id":"sensor_lag")",
              "unknown, for functions without a name were ahead by half a hundredth of it"},
-        Miss{"faint", "coloured", "stribeck_friction", "9310", R"("alternatives":[{"id":"stribeck_friction")",
-             "Coulomb's friction, beside which its fall from rest was not needed"}));
+        Miss{"faint", "coloured", "asymmetric_hysteresis", "9310",
+             R"("alternatives":[{"id":"asymmetric_hysteresis")",
+             "a hysteresis, beside which the difference by direction was not needed"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

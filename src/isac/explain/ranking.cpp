@@ -23,8 +23,9 @@ constexpr double kLimitReach =
 
 }  // namespace
 
-bool Ranking::touches_pressures(const Trial& t) const {
-  return (library_.hypotheses[static_cast<std::size_t>(t.hypothesis)].chains & kPressureChains) != 0;
+bool Ranking::is_dry(const Trial& t) const {
+  const Hypothesis& h = library_.hypotheses[static_cast<std::size_t>(t.hypothesis)];
+  return h.dry && h.info().state_count == 0;
 }
 
 int Ranking::parameters_of(const Trial& t) const {
@@ -126,7 +127,7 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     for (std::size_t i = 1; i < trials.size(); ++i) {
       const double apart = trials[i].behind.separation,
                    closed = (before.squaredNorm() - trials[0].loss) / trials[i].behind.unit,
-                   hardly_any = touches_pressures(trials[0]) ? 0 : kHardlyAny * closed;
+                   hardly_any = is_dry(trials[i]) ? kHardlyAny * closed : 0;
       const bool twins = apart < kTwinLimit;
       const bool simpler =
           nests(id_of(trials[0]), id_of(trials[i])) &&

@@ -23,8 +23,9 @@ inline constexpr double kSurest = 0.99;
 /// What stands first in a set is so much likelier than the noise alone would have it: with the same two or three names in the set, the first was
 /// right in 23 of 35 blind datasets, where the noise alone had said 15.
 inline constexpr double kFirst = 2;
-/// Of what a name closes, in squares of sigma: no equation of forces or motion is truer than that. A friction that falls from rest, closer to
-/// Coulomb's than that, was Coulomb's (0.0011); general effects that are there are 0.028 and more from their simple cases (seed 9311, by the oracle).
+/// Of what a name closes, in squares of sigma: no equation is truer than that, a dry friction's least, for an encoder tells roughly when a slow
+/// motion turns. A friction that falls from rest, closer to Coulomb's than that, was Coulomb's (0.0011); general effects that are there are 0.028
+/// and more from their simple cases (seed 9311, by the oracle).
 inline constexpr double kHardlyAny = 0.005;
 
 /// A candidate that was refitted beside what was there already.
@@ -43,7 +44,8 @@ class Ranking {
  public:
   Ranking(const Prepared& data, const Library& library) : data_(data), library_(library) {}
 
-  [[nodiscard]] bool touches_pressures(const Trial& t) const;
+  /// Friction that jumps with the direction and remembers nothing.
+  [[nodiscard]] bool is_dry(const Trial& t) const;
   [[nodiscard]] int parameters_of(const Trial& trial) const;
   [[nodiscard]] std::string id_of(const Trial& trial) const;
   /// Do both enter forces and motion, or pressures? What closes another reading is missing beside the first, and no rival of it.
