@@ -28,12 +28,12 @@ constexpr double kThin =
     1;  // exponent, Laplace's: noise with a fatter tail has one that no two quantiles tell
 constexpr double kAlike = 0.5;  // of the height: how far the neighbours may be apart, or off theirs
 // Of the neighbours one, two and three samples away, on either side: what any cubic passes, at the least variance, 3/2 with the sample's.
-constexpr double kWeight[] = {3.0 / 7, 3.0 / 14, -1.0 / 7};
-constexpr std::size_t kReach = std::size(kWeight);
+constexpr double kOfNeighbour[] = {3.0 / 7, 3.0 / 14, -1.0 / 7};
+constexpr std::size_t kNeighboursEachSide = std::size(kOfNeighbour);
 
 double difference(const std::vector<double>& x, std::size_t k) {
   double d = x[k];
-  for (std::size_t j = 1; j <= kReach; ++j) d -= kWeight[j - 1] * (x[k - j] + x[k + j]);
+  for (std::size_t j = 1; j <= kNeighboursEachSide; ++j) d -= kOfNeighbour[j - 1] * (x[k - j] + x[k + j]);
   return d;
 }
 
@@ -78,7 +78,7 @@ Outliers count_outliers(Readings readings, double limit) {
   std::vector<double> heights;
   std::size_t samples = 0;
   for (const std::vector<double>* x : readings)
-    for (std::size_t k = kReach; k + kReach < x->size(); ++k) {
+    for (std::size_t k = kNeighboursEachSide; k + kNeighboursEachSide < x->size(); ++k) {
       const double d = difference(*x, k);
       if (!std::isfinite(d)) continue;
       ++samples;
@@ -97,14 +97,14 @@ Outliers find_outliers(Readings readings, double quantum) {
   for (const std::vector<double>* x : readings) {
     std::vector<double> off(x->size(), std::numeric_limits<double>::quiet_NaN());
     std::vector<char> beside(x->size(), 0);
-    for (std::size_t k = kReach; k + kReach < x->size(); ++k) {
+    for (std::size_t k = kNeighboursEachSide; k + kNeighboursEachSide < x->size(); ++k) {
       off[k] = std::abs(difference(*x, k));
       if (!std::isfinite(off[k])) continue;
       ++samples;
       if (off[k] <= nearest || !alone(*x, k, off[k])) continue;
       heights.push_back(off[k]);
       if (off[k] > kFarOut * white)
-        for (std::size_t j = 1; j <= kReach; ++j) beside[k - j] = beside[k + j] = 1;
+        for (std::size_t j = 1; j <= kNeighboursEachSide; ++j) beside[k - j] = beside[k + j] = 1;
     }
     for (std::size_t k = 0; k < off.size(); ++k)
       if (std::isfinite(off[k]) && beside[k] == 0) size.push_back(off[k]);

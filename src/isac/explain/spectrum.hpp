@@ -27,7 +27,7 @@ struct Series {
   double start = 0;     ///< s, time of the first sample by the run's clock
   std::vector<double> value;
   std::vector<std::vector<double>> drivers;  ///< what the line must not stand in: motion, command
-  std::vector<double> force[2];  ///< N as read, of the torque's samples, where the two are known
+  std::vector<double> force[2];              ///< N as read, of the torque's samples, where the two are known
 };
 
 struct SpectralLine {
