@@ -73,4 +73,11 @@ bool nests(const std::string& general, const std::string& simple) noexcept {
                      [&](const auto& pair) { return general == pair[0] && simple == pair[1]; });
 }
 
+bool is_a_loop_with_an_offset(const std::string& a, const std::string& b) noexcept {
+  const auto is_offset = [](const std::string& id) {
+    return id == "torque_offset" || id == "encoder_offset" || nests(id, "torque_offset");
+  };
+  return (a == "hysteresis" && is_offset(b)) || (b == "hysteresis" && is_offset(a));
+}
+
 }  // namespace isac::explain

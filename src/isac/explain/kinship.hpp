@@ -20,5 +20,7 @@ namespace isac::explain {
 [[nodiscard]] const char* family_of(int effect) noexcept;
 /// Is `simple` a special case of `general`? Both are ids.
 [[nodiscard]] bool nests(const std::string& general, const std::string& simple) noexcept;
+/// Are these two, in either order, together what a hysteresis that differs by direction is, with one width?
+[[nodiscard]] bool is_a_loop_with_an_offset(const std::string& a, const std::string& b) noexcept;
 
 }  // namespace isac::explain

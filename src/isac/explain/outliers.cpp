@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kAlpha = 0.001;
 constexpr double kFarOut =
-    8;  // standard deviations of the white noise: alone so far out is no part of its tail
+    8;  // standard deviations of the white noise: beside what is alone so far out nothing tells its tail
 constexpr double kLeastOut = 6.5;   // of them: 5.3 deviations of a difference, 1e-7 of normal noise
 constexpr double kLessBent = 0.96;  // than the quantiles say: they have errors, and a tail may become fatter
 constexpr double kMostBent = 1.6;   // exponent of a tail, 2 for normal noise far out
@@ -23,7 +23,7 @@ constexpr double kOfThoseThere = 0.04;  // of so many: what the tail may hold of
 constexpr double kOfThoseNearer = 0.2;  // and nearer, where it is better known
 constexpr double kNearer = 5.5;         // standard deviations of the white noise
 constexpr double kFarther = 1.15;       // from one limit to the next,
-constexpr double kNotBeyond = 13;       // standard deviations, where the tail's end is no farther
+constexpr double kNotBeyond = 13;       // standard deviations, the last such limit
 constexpr double kThin =
     1;  // exponent, Laplace's: noise with a fatter tail has one that no two quantiles tell
 constexpr double kAlike = 0.5;  // of the height: how far the neighbours may be apart, or off theirs
@@ -89,8 +89,9 @@ Outliers count_outliers(Readings readings, double limit) {
 
 Outliers find_outliers(Readings readings, double quantum) {
   const double white = white_noise(readings);
-  // The tail of the noise: without what stands alone far out, and without its neighbours, whose differences are up to 0.43 of its. (One
-  // spike in 140 samples makes seven in a hundred differences, and the quantiles that the tail is read off.)
+  // The tail of the noise: without the neighbours of what stands alone far out, whose differences are up to 0.43 of its. (One spike in 140
+  // samples makes six such, four in a hundred.) Itself stays in: of a real amplifier's samples a hundredth is such, and without them its tail
+  // looked thin.
   std::vector<double> size, heights;
   std::size_t samples = 0;
   const double nearest = std::max(kNearer * white, 3 * quantum);
@@ -121,8 +122,7 @@ Outliers find_outliers(Readings readings, double quantum) {
   const double q90 = series::quantile(size, 0.90), q98 = series::quantile(size, 0.98);
   if (!(q98 > q90 && q90 > 0)) return {};
   const Tail tail(0.1, q90, 0.02, q98);
-  // Many beyond where the tail holds hardly any need not each be beyond its end. (Read off farther out, q98 and q995, it bends soon where noise
-  // is louder at times, and single readings of a real amplifier stood out of it.)
+  // Many beyond where the tail holds hardly any need not each be beyond its end.
   for (double limit = std::max(tail.exponent >= kThin ? nearest : kLeastOut * white, 3 * quantum);
        limit < kNotBeyond * white; limit *= kFarther) {
     const Outliers many = beyond(limit);

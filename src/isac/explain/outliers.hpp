@@ -6,12 +6,13 @@
 ///     |(x_{k−1} + x_{k+1} − x_{k−2} − x_{k+2})/2| < |d|/2: where a command jumps, a smoothed pressure rounds the torque's corner, which is no spike
 ///   limit = max(q98 (ln(N/α)/ln 50)^(1/(0.96 k)), 6.5 s, 3 quanta),  k = ln(ln 50/ln 10)/ln(q98/q90), 0.5 ≤ k ≤ 1.6
 ///
-/// q are quantiles of |d|, without what stands alone beyond 8 s and its neighbours: the tail ln(1/S) = (x/a)^k that passes through both is continued
+/// q are quantiles of |d|, without the neighbours of what stands alone beyond 8 s: the tail ln(1/S) = (x/a)^k that passes through both is continued
 /// to where one of N samples passes with probability α (k is 1 for Laplace's noise, 1.5 here for normal noise, whose own tail is thinner
-/// still). First, the nearest limit from 5.5 s (and 3 quanta) on that 25 or more pass, of which the tail holds a twenty-fifth at most (a tenth below
-/// 6.5 s), is the limit. Else what passes holds a quarter of s for sure, or is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5,
-/// q98/ln 50), and 8 s at least: steps of a converter bend a tail the other way. Five must pass before they count as spikes (raw_effects.cpp). s is the standard deviation of white
-/// noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
+/// still). First, of limits 15 % apart up to 13 s, the nearest that 25 or more pass, of which the tail holds a twenty-fifth at most (a fifth below
+/// 6.5 s), is the limit; they begin at 5.5 s where k ≥ 1, else at 6.5 s, and at 3 quanta at least. Else what passes the limit above holds a quarter of s for sure, or
+/// is 25 samples and more, or the limit is the end of an exponential tail, q98 + b ln(0.02 N/α), b = max((q98 − q90)/ln 5, q98/ln 50), and 8 s
+/// at least: steps of a converter bend a tail the other way. Five must pass before they count as spikes (raw_effects.cpp). s is the standard
+/// deviation of white noise, a quantum the smallest change of the reading: a last bit that flickers is no spike.
 /// Units: the signal's. Threads: pure. Errors: none.
 /// Source: docs/derivations/explain.md.
 #pragma once

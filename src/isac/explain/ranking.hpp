@@ -23,9 +23,9 @@ inline constexpr double kSurest = 0.99;
 /// What stands first in a set is so much likelier than the noise alone would have it: with the same two or three names in the set, the first was
 /// right in 23 of 35 blind datasets, where the noise alone had said 15.
 inline constexpr double kFirst = 2;
-/// Of what a name closes, in squares of sigma: no equation is truer than that, a dry friction's least, for an encoder tells roughly when a slow
-/// motion turns. A friction that falls from rest, closer to Coulomb's than that, was Coulomb's (0.0011); general effects that are there are 0.028
-/// and more from their simple cases (seed 9311, by the oracle).
+/// Of what a name closes, in squares of sigma: no equation is truer than that. So little beyond a dry friction makes no general case of it (the
+/// encoder tells roughly when a slow motion turns: a friction that falls from rest, 0.0011 from Coulomb's, was Coulomb's; general effects that are
+/// there are 0.028 and more from their simple cases, seed 9311, by the oracle), and no rival without a name takes a name away by it.
 inline constexpr double kHardlyAny = 0.005;
 
 /// A candidate that was refitted beside what was there already.

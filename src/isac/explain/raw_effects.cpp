@@ -90,6 +90,7 @@ double taken_by_line(const SpectralLine& line, const std::vector<Series>& runs) 
 /// The readings whose single samples may be spikes: both forces, else the torque's residual.
 struct Read {
   std::vector<const std::vector<double>*> readings;
+  bool of_forces = false;
   double of_torque = 1;  ///< mean square in the torque for a mean square over the readings
 };
 
@@ -99,6 +100,7 @@ Read readings_of(const std::vector<Series>& runs, double wheel_radius) {
     for (const std::vector<double>& force : run.force)
       if (!force.empty()) read.readings.push_back(&force);
   if (!read.readings.empty()) {
+    read.of_forces = true;
     read.of_torque = 2 * wheel_radius * wheel_radius;  // two readings for each sample of the torque
     return read;
   }
@@ -166,24 +168,23 @@ std::vector<RawEffect> look(const Predictor& predictor, const ModelPoint& model,
   const Read read = readings_of(torque, radius);
   const Outliers spikes = find_outliers(read.readings, quantum_of(read));
   if (spikes.count < kFewestSpikes) return all;
-  const bool of_forces = !torque.front().force[0].empty();
-  const double newton = of_forces ? 1 : 1 / radius;
+  const double newton = read.of_forces ? 1 : 1 / radius;
   RawEffect effect;
   effect.candidate = candidate_of("spikes");
   effect.rms = std::sqrt(read.of_torque) * spikes.rms;
   effect.p_value = 0.001;
   const double count = static_cast<double>(spikes.count), n = static_cast<double>(spikes.samples);
   // Of a torque's samples either of two sensors may have made one.
-  const double sensors = of_forces ? 1 : 2;
+  const double sensors = read.of_forces ? 1 : 2;
   set(effect.candidate.parameters[0], count / n / sensors,
       spikes.among_noise ? kNotKnown : std::sqrt(count) / n / sensors);
   set(effect.candidate.parameters[1], newton * spikes.height, kNotKnown);
   effect.candidate.evidence.push_back(
-      {true,
-       fmt::format("{} single samples of {} stand {} {} or more off their neighbours, {} {} in the "
-                   "middle; noise with the {} own tails leaves hardly any.",
-                   spikes.count, spikes.samples, rounded(spikes.limit), of_forces ? "N" : "N m",
-                   rounded(spikes.height), of_forces ? "N" : "N m", of_forces ? "readings'" : "residual's")});
+      {true, fmt::format("{} single samples of {} stand {} {} or more off their neighbours, {} {} in the "
+                         "middle; noise with the {} own tails leaves hardly any.",
+                         spikes.count, spikes.samples, rounded(spikes.limit), read.of_forces ? "N" : "N m",
+                         rounded(spikes.height), read.of_forces ? "N" : "N m",
+                         read.of_forces ? "readings'" : "residual's")});
   if (spikes.among_noise)
     effect.candidate.evidence.push_back(
         {false, "Smaller ones hide in the noise: there are more of them, and smaller, than these."});

@@ -26,9 +26,8 @@ constexpr double kCloserThanChance = 1.28;
 // Of what a name closes, in units of noise: no equation is truer than that. Of names that functions came close to, a right one on a clear day had 0.003,
 // five wrong ones 0.017 and more.
 constexpr double kWorthComparing = 0.01;
-// Of it, what a rival that is ahead may have beyond a name without taking it away: functions 0.0045 beyond a lag of the force amplifiers that closed
-// 83 sigma beside a wandering zero, any valve 0.00026 beyond a dead time with a limit of the flow.
-// (kHardlyAny, ranking.hpp.)
+// Of it, what any valve may have beyond a name without taking it away: 0.00026 beyond a dead time with a limit of the flow. (Functions: kHardlyAny;
+// 0.0045 beyond a lag of the force amplifiers that closed 83 sigma beside a wandering zero.)
 constexpr double kHardlyAnyOfValve = 0.0005;
 constexpr double kAsMuchAsItself = 1, kForSure = 10;  // variation of an effect's size, squared; sigma
 constexpr double kGiant = 8;  // of what all effects close together, one by itself: the others take it back
@@ -53,13 +52,6 @@ bool taken_for_one_another(const models::EffectInfo& a, const models::EffectInfo
     return false;
   };
   return names(a, b.id) || names(b, a.id);
-}
-
-bool is_a_loop_with_an_offset(const std::string& a, const std::string& b) {
-  const auto is_offset = [](const std::string& id) {
-    return id == "torque_offset" || id == "encoder_offset" || nests(id, "torque_offset");
-  };
-  return (a == "hysteresis" && is_offset(b)) || (b == "hysteresis" && is_offset(a));
 }
 
 bool is_beaten(const Comparison& behind) {
