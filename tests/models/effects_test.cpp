@@ -5,8 +5,11 @@
 #include <cmath>
 #include <random>
 #include <set>
+#include <span>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "isac/models/effect_hooks.hpp"
 
@@ -205,6 +208,67 @@ TEST_F(EveryEffect, of_the_torque_with_a_shape_is_linear_in_its_amplitudes) {
   EXPECT_GE(asked, 30);
   EXPECT_FALSE(is_linear_for_its_shape(effect_catalogue()[find_effect("backlash")]));
   EXPECT_FALSE(is_linear_for_its_shape(effect_catalogue()[find_effect("lever_arm_variation")]));
+}
+
+TEST_F(EveryEffect, without_states_has_its_amplitudes_torques_at_once) {
+  int asked = 0;
+  for (index_ = 0; index_ < Catalogue::kSize; ++index_) {
+    if (!is_linear_for_its_shape(info()) || info().state_count > 0) continue;
+    SCOPED_TRACE(info().id);
+    ++asked;
+    std::vector<JointPoint<double>> points;
+    for (int k = 0; k < 100; ++k) points.push_back(random_point());
+    double shape[kMaxEffectParameters];
+    random_parameters(shape);
+    std::vector<std::vector<double>> torques(static_cast<std::size_t>(amplitude_count(info())),
+                                             std::vector<double>(points.size(), 0.25));
+    std::vector<double*> sums;
+    for (std::vector<double>& torque : torques) sums.push_back(torque.data());
+    const auto at = [&](std::size_t k) { return points[k]; };
+    add_amplitude_torques(index(), shape, at, -2.0, points.size(), std::span<double* const>(sums));
+    int of = -1;
+    for (int j = 0; j < info().parameter_count; ++j) {
+      if (!is_amplitude(info().parameters[j])) continue;
+      ++of;
+      double q[kMaxEffectParameters];
+      for (int i = 0; i < info().parameter_count; ++i)
+        q[i] = is_amplitude(info().parameters[i]) ? 0 : shape[i];
+      q[j] = 1;
+      for (std::size_t k = 0; k < points.size(); ++k)
+        EXPECT_EQ(torques[static_cast<std::size_t>(of)][k],
+                  0.25 - 2.0 * effect_torque(index(), q, points[k]));
+    }
+    // One sum too few: nothing is written.
+    const std::vector<std::vector<double>> before = torques;
+    sums.pop_back();
+    add_amplitude_torques(index(), shape, at, -2.0, points.size(), std::span<double* const>(sums));
+    EXPECT_EQ(torques, before);
+  }
+  EXPECT_GE(asked, 25);
+}
+
+// explain integrates them by steps whose slope it takes from the ends of this line.
+TEST_F(EveryEffect, that_is_called_linear_in_its_state_has_a_rate_on_a_line) {
+  int asked = 0;
+  for (index_ = 0; index_ < Catalogue::kSize; ++index_) {
+    if (!info().linear_in_state) continue;
+    SCOPED_TRACE(info().id);
+    ++asked;
+    EXPECT_EQ(info().state_count, 1);
+    for (int i = 0; i < 200; ++i) {
+      const auto point = random_point();
+      double q[kMaxEffectParameters];
+      random_parameters(q);
+      const auto rate = [&](double z) {
+        double dz = 0;
+        effect_derivative(index(), q, point, &z, &dz);
+        return dz;
+      };
+      const double at = uniform(-1, 1), line = rate(0) + at * (rate(1) - rate(0));
+      EXPECT_NEAR(rate(at), line, 1e-12 * (std::abs(rate(0)) + std::abs(rate(1))));
+    }
+  }
+  EXPECT_EQ(asked, 3);
 }
 
 TEST_F(EveryEffect, that_is_called_linear_obeys_superposition) {

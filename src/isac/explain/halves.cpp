@@ -11,6 +11,7 @@
 
 #include "isac/explain/coordinates.hpp"
 #include "isac/explain/labels.hpp"
+#include "isac/explain/projection.hpp"
 #include "isac/explain/slopes.hpp"
 #include "isac/explain/variable_words.hpp"
 
@@ -146,7 +147,7 @@ class Halving {
     if (std::min(up, down) < kNextToNothing * whole) return;
     Eigen::MatrixXd d = signs.asDiagonal() * slopes_;
     weigh(data_, *place_.weights, d, threads_);
-    d = place_.project_columns(d);
+    take_out(place_.basis, d);
     const Eigen::VectorXd score = -(d.transpose() * place_.residual);
     const Eigen::MatrixXd noisy = noise_.asDiagonal() * d;
     const Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> variance(noisy.transpose() * noisy),

@@ -90,11 +90,17 @@ class Predictor {
                                         const PreparedRun& run, const Inputs& in, bool motion) const;
   /// Is it a torque that the rows of this chain have in them?
   bool enters(const Hypothesis& effect, bool motion) const noexcept;
-  /// Adds to each of `sums` the effect's torque with one set of `values`, which share what its states depend on with those of `a`; at one
-  /// sample of `every` where it has no states.
-  void add_torques(const ModelPoint& model, const Active& a, const PreparedRun& run, const Inputs& in,
-                   std::size_t every, std::span<const Values> values,
-                   std::span<std::vector<double>> sums) const;
+  auto points_of(const ModelPoint& model, const Hypothesis& effect, const PreparedRun& run,
+                 const Inputs& in) const;
+  /// Of a driven axis what acts on it is what its drive need not do.
+  double sign_of_torque() const noexcept { return data_->baseline.driven ? -1.0 : 1.0; }
+  /// Adds the effect's torque at every sample.
+  void add_torque(const ModelPoint& model, const Active& a, const PreparedRun& run, const Inputs& in,
+                  std::vector<double>& sum) const;
+  /// The same with 1 for one amplitude and 0 for the others, for each of them; at one sample of `every` where it has no states.
+  std::vector<std::vector<double>> torques_of_amplitudes(const ModelPoint& model, const Active& a,
+                                                         const PreparedRun& run, const Inputs& in,
+                                                         std::size_t every) const;
   std::size_t thinned(const Hypothesis& effect, double sigma) const noexcept;
   /// Can its rows be had from columns? Not where it bends, or where states are read off the data.
   bool has_columns(const Hypothesis& effect, bool motion) const noexcept;

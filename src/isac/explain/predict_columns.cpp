@@ -75,19 +75,12 @@ std::shared_ptr<const Predictor::Columns> Predictor::columns_of(const ModelPoint
   thread_local LastAsked<Columns> last;
   return last.of(index, key, [&] {
     auto made = std::make_shared<Columns>();
-    std::vector<Values> ones;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!h.amplitude[i]) continue;
-      made->amplitudes.push_back(i);
-      ones.push_back(null_values(h, a.values));
-      ones.back()[i] = 1;
-    }
+    for (std::size_t i = 0; i < count; ++i)
+      if (h.amplitude[i]) made->amplitudes.push_back(i);
     const PreparedRun& run = data_->runs[index];
     const double sigma = (motion ? left_to_smooth(data_->smoothing) : data_->smoothing.torque) / run.interval;
     const std::size_t every = thinned(h, sigma);
-    std::vector<std::vector<double>> torques(ones.size(),
-                                             std::vector<double>((run.time.size() + every - 1) / every, 0.0));
-    add_torques(model, a, run, in, every, ones, torques);
+    const std::vector<std::vector<double>> torques = torques_of_amplitudes(model, a, run, in, every);
     const Kernel kernel(sigma / static_cast<double>(every));
     const Chain chain = motion ? Chain::kMotion : Chain::kTorque;
     for (std::size_t i = data_->run_begin[index]; i < data_->run_begin[index + 1]; ++i)

@@ -33,7 +33,8 @@ class Memory {
   double torque(const JointPoint<double>& x) const { return torque(q_, x); }
   /// With other amplitudes, which the states owe nothing to.
   double torque(const double* q, const JointPoint<double>& x) const { return Effect::torque(q, x, z_); }
-  void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
+  /// Inlined: then only what the effect's equation asks of a point is read.
+  [[gnu::always_inline]] void step(const JointPoint<double>& from, const JointPoint<double>& to, double dt) {
     JointPoint<double> middle = to;
     middle.angle = 0.5 * (from.angle + to.angle);
     middle.velocity = 0.5 * (from.velocity + to.velocity);
@@ -42,16 +43,17 @@ class Memory {
       return;
     }
     if constexpr (Effect::kInfo.state_count == 1) {
-      // A state that slips at its limit must not run past it within a sample.
       const double first = rate(middle, z_[0]);
       if (first == 0) return;
-      const int parts = dry_ ? std::clamp(static_cast<int>(std::abs(first) * dt / 0.03), 1, 16) : 1;
-      const double h = dt / parts;
+      // A state that slips at its limit must not run past it within a sample.
+      constexpr double kLongestMove = 0.03;
+      int parts = 1;
+      if (dry_ && std::abs(first) * dt >= 2 * kLongestMove)
+        parts = std::clamp(static_cast<int>(std::abs(first) * dt / kLongestMove), 1, 16);
+      const double h = parts == 1 ? dt : dt / parts;
       for (int part = 0; part < parts; ++part) {
         const double f = part == 0 ? first : rate(middle, z_[0]);
-        constexpr double kNudge = 1e-6;
-        const double slope = (rate(middle, z_[0] + kNudge) - f) / kNudge * h;
-        z_[0] += h * f * growth(std::min(slope, 5.0));
+        z_[0] += h * f * growth(std::min(slope(middle, f) * h, 5.0));
       }
     } else {
       double k1[2], k2[2], k3[2], k4[2], y[2];
@@ -72,10 +74,35 @@ class Memory {
     Effect::derivative(q_, x, &z, &dz);
     return dz;
   }
+  /// ∂(dz/dt)/∂z, where the rate is `here`. Of a line by its ends: a step then need not wait for the one before to reckon it.
+  double slope(const JointPoint<double>& x, double here) const {
+    if constexpr (Effect::kInfo.linear_in_state) {
+      return rate(x, 1) - rate(x, 0);
+    } else {
+      constexpr double kNudge = 1e-6;
+      return (rate(x, z_[0] + kNudge) - here) / kNudge;
+    }
+  }
   const double* q_;
   bool dry_, plays_;
   double z_[models::kMaxEffectStates] = {};
 };
+
+/// Calls `use(k, memory, x)` at the points x = at(k), k < count, with the states as they are there, from rest at the first.
+template <class PointAt, class Use>
+void follow_memory(const Active& active, const PointAt& at, double interval, std::size_t count, Use&& use) {
+  models::visit_torque_memory(active.hypothesis->effect, [&](auto effect) {
+    Memory<decltype(effect)> memory(active);
+    JointPoint<double> x = at(0);
+    memory.rest(x);
+    for (std::size_t k = 0; k < count; ++k) {
+      const JointPoint<double> next = k == 0 ? x : at(k);
+      if (k > 0) memory.step(x, next, interval);
+      x = next;
+      use(k, memory, x);
+    }
+  });
+}
 
 /// What swings on a free joint, from the kernel's reach before the recording on, where the joint rests.
 void add_swing(const Active& active, const Motion& joint, double interval, double sign,
@@ -87,17 +114,10 @@ void add_swing(const Active& active, const Motion& joint, double interval, doubl
     x.acceleration = joint.acceleration[k];
     return x;
   };
-  models::visit_torque_memory(active.hypothesis->effect, [&](auto effect) {
-    Memory<decltype(effect)> memory(active);
-    JointPoint<double> x = at(0);
-    memory.rest(x);
-    for (std::size_t k = 0; k < joint.angle.size(); ++k) {
-      const JointPoint<double> next = at(k);
-      if (k > 0) memory.step(x, next, interval);
-      x = next;
-      if (k >= joint.lead) sum[k - joint.lead] += sign * memory.torque(x);
-    }
-  });
+  follow_memory(active, at, interval, joint.angle.size(),
+                [&](std::size_t k, const auto& memory, const auto& x) {
+                  if (k >= joint.lead) sum[k - joint.lead] += sign * memory.torque(x);
+                });
 }
 
 /// Where what hangs on a compliance stood when a recording began is not known, and it rings from there: c e^{λt}, λ = W (−d ± i √(1 − d²)),
@@ -165,14 +185,14 @@ std::vector<double> Predictor::torque_of_effects(const ModelPoint& model, std::s
     if (!enters(h, motion) || is_null(a)) continue;
     if (sum.empty()) sum.assign(run.time.size(), 0.0);
     if (motion && has_fitted_states(h) && in.swing != nullptr) {
-      const double sign = data_->baseline.driven ? -1.0 : 1.0;
+      const double sign = sign_of_torque();
       add_swing(a, *in.swing, run.interval, sign, sum);
       if (!a.as_known_beforehand)
         add_ring(run, a.values, data_->rig.inertia, data_->smoothing.torque, *in.acceleration,
                  in.swing->from_rest ? kAtRest : kAtStart, sign, sum);
       continue;
     }
-    add_torques(model, a, run, in, 1, std::span(&a.values, 1), std::span(&sum, 1));
+    add_torque(model, a, run, in, sum);
   }
   return sum;
 }
@@ -182,38 +202,57 @@ bool Predictor::enters(const Hypothesis& h, bool motion) const noexcept {
          (!data_->baseline.terms.empty() || (h.seen_by == SeenBy::kMotionOnly) == motion);
 }
 
-void Predictor::add_torques(const ModelPoint& model, const Active& a, const PreparedRun& run,
-                            const Inputs& in, std::size_t every, std::span<const Values> values,
-                            std::span<std::vector<double>> sums) const {
-  const Hypothesis& h = *a.hypothesis;
-  const double sign = data_->baseline.driven ? -1.0 : 1.0;
+/// Where the effect's equation is evaluated, sample by sample of the recording.
+auto Predictor::points_of(const ModelPoint& model, const Hypothesis& h, const PreparedRun& run,
+                          const Inputs& in) const {
   const auto term = [&](int at) { return at >= 0 ? model.base[static_cast<std::size_t>(at)] : 0.0; };
   const BaselineOfPoint base{.stiffness = term(stiffness_),
                              .pressure_gain = term(pressure_gain_),
                              .cubic_damping = term(cubic_damping_),
                              .damping = term(damping_)};
-  const std::vector<double>& velocity = h.dry ? *in.dry : *in.velocity;
-  const auto at = [&](std::size_t k) {
-    return point_at(data_->rig, base, *in.angle, velocity, *in.acceleration, in.pressure, time_of(h, run, k),
-                    k);
+  return [ base, &velocity = h.dry ? *in.dry : *in.velocity, &h, &run, &in, &rig = data_->rig ](std::size_t k)
+      __attribute__((always_inline)) {
+    return point_at(rig, base, *in.angle, velocity, *in.acceleration, in.pressure, time_of(h, run, k), k);
   };
-  if (h.info().state_count == 0) {
-    for (std::size_t i = 0; i < sums.size(); ++i)
-      models::add_effect_torques(
-          h.effect, values[i].data(), [&](std::size_t k) { return at(k * every); }, sign, std::span(sums[i]));
-    return;
+}
+
+void Predictor::add_torque(const ModelPoint& model, const Active& a, const PreparedRun& run, const Inputs& in,
+                           std::vector<double>& sum) const {
+  const auto at = points_of(model, *a.hypothesis, run, in);
+  if (a.hypothesis->info().state_count == 0)
+    models::add_effect_torques(a.hypothesis->effect, a.values.data(), at, sign_of_torque(), std::span(sum));
+  else
+    follow_memory(a, at, run.interval, sum.size(), [&](std::size_t k, const auto& memory, const auto& x) {
+      sum[k] += sign_of_torque() * memory.torque(x);
+    });
+}
+
+std::vector<std::vector<double>> Predictor::torques_of_amplitudes(const ModelPoint& model, const Active& a,
+                                                                  const PreparedRun& run, const Inputs& in,
+                                                                  std::size_t every) const {
+  const Hypothesis& h = *a.hypothesis;
+  const std::size_t count = (run.time.size() + every - 1) / every;
+  std::vector<Values> ones;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(h.info().parameter_count); ++i) {
+    if (!models::is_amplitude(h.info().parameters[i])) continue;
+    ones.push_back(null_values(h, a.values));
+    ones.back()[i] = 1;
   }
-  models::visit_torque_memory(h.effect, [&](auto effect) {
-    Memory<decltype(effect)> memory(a);
-    JointPoint<double> x = at(0);
-    memory.rest(x);
-    for (std::size_t k = 0; k < sums[0].size(); ++k) {
-      const JointPoint<double> next = k == 0 ? x : at(k);
-      if (k > 0) memory.step(x, next, run.interval);
-      x = next;
-      for (std::size_t i = 0; i < sums.size(); ++i) sums[i][k] += sign * memory.torque(values[i].data(), x);
-    }
-  });
+  std::vector<std::vector<double>> torques(ones.size(), std::vector<double>(count, 0.0));
+  const auto at = points_of(model, h, run, in);
+  if (h.info().state_count == 0) {
+    std::vector<double*> sums;
+    for (std::vector<double>& torque : torques) sums.push_back(torque.data());
+    models::add_amplitude_torques(
+        h.effect, a.values.data(), [&](std::size_t k) { return at(k * every); }, sign_of_torque(), count,
+        std::span<double* const>(sums));
+  } else {
+    follow_memory(a, at, run.interval, count, [&](std::size_t k, const auto& memory, const auto& x) {
+      for (std::size_t i = 0; i < ones.size(); ++i)
+        torques[i][k] = sign_of_torque() * memory.torque(ones[i].data(), x);
+    });
+  }
+  return torques;
 }
 
 double Predictor::change_at(const ModelPoint& model, const PreparedRun& run, std::size_t k,

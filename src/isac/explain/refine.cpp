@@ -103,10 +103,6 @@ Eigen::VectorXd Around::project(const Eigen::VectorXd& x) const {
   return x - basis * (basis.transpose() * x);
 }
 
-Eigen::MatrixXd Around::project_columns(const Eigen::MatrixXd& x) const {
-  return x - basis * (basis.transpose() * x);
-}
-
 Eigen::VectorXd Around::release(Eigen::VectorXd left) const {
   if (held.slopes.cols() > 0 && left.allFinite())
     left += held.slopes * come_back(held, held_gram, held.slopes.transpose() * left);

@@ -29,8 +29,6 @@ struct Around {
   Eigen::MatrixXd held_gram;
 
   [[nodiscard]] Eigen::VectorXd project(const Eigen::VectorXd& x) const;
-  /// Column by column.
-  [[nodiscard]] Eigen::MatrixXd project_columns(const Eigen::MatrixXd& x) const;
   /// A projected residual with what the held tolerances take of it when they come back.
   [[nodiscard]] Eigen::VectorXd release(Eigen::VectorXd left) const;
   /// What is left of the residual beside a projected response at its best amplitude, with the tolerances come back as far as it lets them.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "isac/estimate/linear_algebra.hpp"
+#include "isac/explain/projection.hpp"
 #include "isac/explain/workers.hpp"
 
 namespace isac::explain {
@@ -155,7 +156,7 @@ class Screening {
     Eigen::MatrixXd x = rows_of(h, hypothesis, part, ways, columns);
     const Eigen::VectorXd raw = x.colwise().squaredNorm();
     const Eigen::MatrixXd raw_of_chain = norms_by_chain(x);
-    x = place_.project_columns(x);
+    take_out(place_.basis, x);
     leave_out_mimicked(raw_of_chain, x);
     const Eigen::MatrixXd plain = unfiltered_each(data_, *place_.weights, x);
     Done done;
@@ -202,7 +203,7 @@ class Screening {
           kept_->function(first + static_cast<std::size_t>(column)) = x.col(column).cast<float>();
     }
     const Eigen::VectorXd raw = x.colwise().squaredNorm();
-    x = place_.project_columns(x);
+    take_out(place_.basis, x);
     const Eigen::MatrixXd plain = unfiltered_each(data_, *place_.weights, x);
     Done done;
     for (std::size_t d = first; d < last; ++d) {

@@ -61,6 +61,7 @@ struct EffectInfo {
       false;  ///< never gives energy: torque · velocity ≤ 0 (over a cycle, where it has states)
   bool added_to_output =
       false;  ///< a constant of the recorded output, not a resistance: its sign is never turned
+  bool linear_in_state = false;       ///< of one state, whose rate at a given point is a + b z
   const char* reported_as = nullptr;  ///< another form of this effect: the id under which a search names it
 };
 

@@ -21,6 +21,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "isac/models/effect_types.hpp"
 #include "isac/models/effects_friction.hpp"
@@ -51,15 +52,21 @@ using Catalogue = Join<effect::TorqueEffects, effect::FrictionEffects, effect::M
   return -1;
 }
 
+/// Has it a value with which the effect is absent? The others are shapes: a width, a time, a place.
+[[nodiscard]] constexpr bool is_amplitude(const ParameterInfo& parameter) noexcept {
+  return parameter.null_value == parameter.null_value;  // not NaN
+}
+
+[[nodiscard]] constexpr int amplitude_count(const EffectInfo& info) noexcept {
+  int count = 0;
+  for (int i = 0; i < info.parameter_count; ++i) count += is_amplitude(info.parameters[i]) ? 1 : 0;
+  return count;
+}
+
 /// Is a torque effect linear in the parameters that have a null value, all of them 0, for given others, which alone its states depend on? So is
 /// each that is linear at all, and each that has a shape (a width, a time, a place) besides its amplitudes.
 [[nodiscard]] constexpr bool is_linear_for_its_shape(const EffectInfo& info) noexcept {
-  bool linear = info.linear;
-  for (int i = 0; i < info.parameter_count; ++i) {
-    const double null = info.parameters[i].null_value;
-    linear = linear || null != null;
-  }
-  return linear && info.hook == Hook::kTorque;
+  return (info.linear || amplitude_count(info) < info.parameter_count) && info.hook == Hook::kTorque;
 }
 
 namespace detail {
@@ -85,6 +92,31 @@ struct TorquesCall {
   static void call(const S* q, const PointAt& at, const S& factor, std::span<S> sum) noexcept {
     if constexpr (requires(const JointPoint<S>& x) { E::torque(q, x); })
       for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += factor * E::torque(q, at(k));
+  }
+};
+
+/// One loop for all amplitudes: what their equation asks of a point is reckoned once.
+template <class S, class PointAt>
+struct AmplitudeTorquesCall {
+  template <class E>
+  static void call(const S* shape, const PointAt& at, const S& factor, std::size_t count,
+                   std::span<S* const> sums) noexcept {
+    if constexpr (requires(const JointPoint<S>& x) { E::torque(shape, x); })
+      [&]<std::size_t... I>(std::index_sequence<I...>) {
+        constexpr int kParameters = E::kInfo.parameter_count;
+        S q[sizeof...(I)][kParameters];
+        for (std::size_t i = 0, j = 0; j < std::size_t{kParameters}; ++j) {
+          const bool amplitude = is_amplitude(E::kInfo.parameters[j]);
+          for (std::size_t a = 0; a < sizeof...(I); ++a)
+            q[a][j] = amplitude ? S(a == i ? 1.0 : 0.0) : shape[j];
+          i += amplitude;
+        }
+        for (std::size_t k = 0; k < count; ++k) {
+          const JointPoint<S> x = at(k);
+          ((sums[I][k] += factor * E::torque(q[I], x)), ...);
+        }
+      }
+    (std::make_index_sequence<amplitude_count(E::kInfo)>());
   }
 };
 
@@ -127,6 +159,18 @@ void add_effect_torques(int effect, const S* parameters, const PointAt& at, cons
   if (!Catalogue::holds(effect)) return;
   Catalogue::kTable<detail::TorquesCall<S, PointAt>>[static_cast<unsigned>(effect)](parameters, at, factor,
                                                                                     sum);
+}
+
+/// For an effect without states that is linear for its shape: sums[i][k] += factor · torque at the point at(k) with 1 for its amplitude i and 0
+/// for the others, for k < count. One of `sums` for each of its amplitudes; of `shape` only the other parameters are read.
+template <class S, class PointAt>
+void add_amplitude_torques(int effect, const S* shape, const PointAt& at, const S& factor, std::size_t count,
+                           std::span<S* const> sums) noexcept {
+  if (!Catalogue::holds(effect) ||
+      sums.size() != static_cast<std::size_t>(amplitude_count(Catalogue::kInfos[effect])))
+    return;
+  Catalogue::kTable<detail::AmplitudeTorquesCall<S, PointAt>>[static_cast<unsigned>(effect)](
+      shape, at, factor, count, sums);
 }
 
 /// Rates of a torque effect's states, per second; nothing is written for effects without states.

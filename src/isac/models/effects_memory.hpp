@@ -27,7 +27,8 @@ struct Hysteresis {
       .linear = false,
       .confused_with = "coulomb_friction, backlash, asymmetric_hysteresis",
       .told_apart_by = "the curve after a reversal",
-      .dissipative = true};
+      .dissipative = true,
+      .linear_in_state = true};
   template <class S>
   static S torque(const S* q, const JointPoint<S>&, const S* z) noexcept {
     return -(q[0] * z[0]);
@@ -58,7 +59,8 @@ struct AsymmetricHysteresis {
                                     .torque_term = true,
                                     .linear = false,
                                     .confused_with = "hysteresis, asymmetric_fill_vent",
-                                    .told_apart_by = "survives at 0.01 Hz"};
+                                    .told_apart_by = "survives at 0.01 Hz",
+                                    .linear_in_state = true};
   template <class S>
   static S torque(const S* q, const JointPoint<S>&, const S* z) noexcept {
     return -((z[0] > S(0.0) ? q[0] : q[1]) * z[0]);
@@ -88,7 +90,8 @@ struct Creep {
       .linear = false,
       .confused_with = "thermal_drift, hysteresis, encoder_drift",
       .told_apart_by = "returns after unloading",
-      .dissipative = true};
+      .dissipative = true,
+      .linear_in_state = true};
   template <class S>
   static S torque(const S* q, const JointPoint<S>& x, const S* z) noexcept {
     return -(q[0] * (x.angle - z[0]));

@@ -1,0 +1,102 @@
+#include "isac/explain/projection.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+
+#include "isac/series/simd.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr std::ptrdiff_t kBlock = 512;  // rows whose part of both matrices stays near the processor
+
+/// Four rows; a plain processor takes two steps for each, to the same digits.
+typedef double Rows __attribute__((vector_size(32)));
+constexpr std::ptrdiff_t kRows = sizeof(Rows) / sizeof(double);
+
+[[gnu::always_inline]] inline void load(Rows& rows, const double* from) {
+  std::memcpy(&rows, from, sizeof rows);
+}
+
+/// products[p + q · stride] += Σ over rows of b_p x_q, of P columns of the basis and Q of x.
+template <int P, int Q>
+[[gnu::always_inline]] inline void add_products(const double* basis, const double* x, std::ptrdiff_t height,
+                                                std::ptrdiff_t count, double* products,
+                                                std::ptrdiff_t stride) {
+  Rows sum[P][Q] = {};
+  std::ptrdiff_t k = 0;
+  for (; k + kRows <= count; k += kRows) {
+    Rows b[P], y[Q];
+    for (int p = 0; p < P; ++p) load(b[p], basis + p * height + k);
+    for (int q = 0; q < Q; ++q) load(y[q], x + q * height + k);
+    for (int p = 0; p < P; ++p)
+      for (int q = 0; q < Q; ++q) sum[p][q] += b[p] * y[q];
+  }
+  for (int p = 0; p < P; ++p)
+    for (int q = 0; q < Q; ++q) {
+      double all = (sum[p][q][0] + sum[p][q][1]) + (sum[p][q][2] + sum[p][q][3]);
+      for (std::ptrdiff_t i = k; i < count; ++i) all += basis[p * height + i] * x[q * height + i];
+      products[p + q * stride] += all;
+    }
+}
+
+/// y −= Σ_p b_p · share_p over P columns of the basis.
+template <int P>
+[[gnu::always_inline]] inline void subtract(const double* basis, std::ptrdiff_t height, std::ptrdiff_t count,
+                                            const double* share, double* y) {
+  std::ptrdiff_t k = 0;
+  for (; k + kRows <= count; k += kRows) {
+    Rows left, b;
+    load(left, y + k);
+    for (int p = 0; p < P; ++p) {
+      load(b, basis + p * height + k);
+      left -= b * share[p];
+    }
+    std::memcpy(y + k, &left, sizeof left);
+  }
+  for (; k < count; ++k)
+    for (int p = 0; p < P; ++p) y[k] -= basis[p * height + k] * share[p];
+}
+
+/// products += Bᵀ x, of `count` rows.
+ISAC_SIMD void add_block(const double* basis, const double* x, std::ptrdiff_t height, std::ptrdiff_t count,
+                         std::ptrdiff_t parameters, std::ptrdiff_t columns, double* products) {
+  for (std::ptrdiff_t p = 0; p < parameters; p += 2) {
+    const bool two = p + 1 < parameters;
+    const double* b = basis + p * height;
+    std::ptrdiff_t q = 0;
+    for (; q + 4 <= columns; q += 4)
+      two ? add_products<2, 4>(b, x + q * height, height, count, products + p + q * parameters, parameters)
+          : add_products<1, 4>(b, x + q * height, height, count, products + p + q * parameters, parameters);
+    for (; q < columns; ++q)
+      two ? add_products<2, 1>(b, x + q * height, height, count, products + p + q * parameters, parameters)
+          : add_products<1, 1>(b, x + q * height, height, count, products + p + q * parameters, parameters);
+  }
+}
+
+/// x −= B products, of `count` rows.
+ISAC_SIMD void subtract_block(const double* basis, double* x, std::ptrdiff_t height, std::ptrdiff_t count,
+                              std::ptrdiff_t parameters, std::ptrdiff_t columns, const double* products) {
+  std::ptrdiff_t p = 0;
+  for (; p + 4 <= parameters; p += 4)
+    for (std::ptrdiff_t q = 0; q < columns; ++q)
+      subtract<4>(basis + p * height, height, count, products + p + q * parameters, x + q * height);
+  for (; p < parameters; ++p)
+    for (std::ptrdiff_t q = 0; q < columns; ++q)
+      subtract<1>(basis + p * height, height, count, products + p + q * parameters, x + q * height);
+}
+
+}  // namespace
+
+void take_out(const Eigen::MatrixXd& basis, Eigen::MatrixXd& x) {
+  Eigen::MatrixXd products = Eigen::MatrixXd::Zero(basis.cols(), x.cols());
+  for (Eigen::Index from = 0; from < x.rows(); from += kBlock)
+    add_block(basis.data() + from, x.data() + from, x.rows(), std::min(kBlock, x.rows() - from), basis.cols(),
+              x.cols(), products.data());
+  for (Eigen::Index from = 0; from < x.rows(); from += kBlock)
+    subtract_block(basis.data() + from, x.data() + from, x.rows(), std::min(kBlock, x.rows() - from),
+                   basis.cols(), x.cols(), products.data());
+}
+
+}  // namespace isac::explain
