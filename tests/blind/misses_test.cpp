@@ -1,4 +1,5 @@
-// Days of the blind generator that isac-explain once missed, each for a reason of its own, judged again.
+// Days of the blind generator that isac-explain once missed, each for a reason of its own, judged again; on one thread each, for ctest runs one
+// on each core.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -39,7 +40,7 @@ TEST_P(Misses, are_answered_rightly) {
   const std::string bin = ISAC_BIN_DIR, results = scratch("misses") + ".jsonl";
   const std::string call = bin + "/blind_run --tier " + miss.tier + " --noise " + miss.noise + " --effect " +
                            miss.effect + " --seed " + miss.seed + " --day " + miss.day + " --results " +
-                           results + " --explain " + bin + "/isac-explain > /dev/null 2>&1";
+                           results + " --explain " + bin + "/isac-explain -- --threads 1 > /dev/null 2>&1";
   const int status = std::system(call.c_str());
   std::string line;
   std::getline(std::ifstream(results) >> std::ws, line);
@@ -237,8 +238,8 @@ TEST_P(PairMisses, are_answered_rightly) {
   const std::string bin = ISAC_BIN_DIR, day = scratch("pair");
   const std::string call = bin + "/blind_generate --out " + day + " --label " + day + ".label --seed " +
                            miss.seed + " --noise " + miss.noise + " --effect " + miss.effects +
-                           " --ratio 0.75 > /dev/null && " + bin + "/isac-explain " + day + " --json " + day +
-                           ".json > /dev/null 2>&1";
+                           " --ratio 0.75 > /dev/null && " + bin + "/isac-explain " + day +
+                           " --threads 1 --json " + day + ".json > /dev/null 2>&1";
   const int status = std::system(call.c_str());
   std::string answer, word;
   for (std::ifstream in(day + ".json"); in >> word;) answer += word;

@@ -1,11 +1,11 @@
 // What the noise is taken for: its colour, its wandering zero, and how much of a pressure's reading is pressure.
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <random>
 
 #include "isac/core/units.hpp"
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/weights.hpp"
 #include "tied_data.hpp"
@@ -226,7 +226,7 @@ TEST(Colour, makes_of_a_jump_what_it_is_worth_beside_noise_that_cannot_jump) {
     }
   Eigen::VectorXd rows = jump;
   weigh(data, weights, rows);
-  const double exact = jump.dot(covariance.ldlt().solve(jump));
+  const double exact = jump.dot(estimate::solve_symmetric(covariance, jump));
   EXPECT_NEAR(rows.squaredNorm(), exact, 1e-9 * exact);
 }
 

@@ -3,18 +3,16 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
-#include <cmath>
+#include <cstdlib>
 #include <limits>
+
+#include "isac/explain/screen.hpp"
 
 namespace isac::explain {
 namespace {
 
-/// Orthonormal columns.
 Eigen::MatrixXd basis(Eigen::Index rows, Eigen::Index columns) {
-  if (columns == 0) return Eigen::MatrixXd(rows, 0);
-  return Eigen::HouseholderQR<Eigen::MatrixXd>(Eigen::MatrixXd::Random(rows, columns)).householderQ() *
-         Eigen::MatrixXd::Identity(rows, columns);
+  return basis_of(Eigen::MatrixXd::Random(rows, columns));
 }
 
 // Rows that do and do not fill a block or a step of four, columns that do and do not fill a group.
