@@ -9,13 +9,13 @@
 namespace isac::explain {
 namespace {
 
-constexpr std::ptrdiff_t kBlock = 512;  // rows whose part of both matrices stays near the processor
+constexpr std::ptrdiff_t kRowsAtOnce = 512;  // rows whose part of both matrices stays near the processor
 
 /// Four rows; a plain processor takes two steps for each, to the same digits.
-typedef double Rows __attribute__((vector_size(32)));
-constexpr std::ptrdiff_t kRows = sizeof(Rows) / sizeof(double);
+typedef double Lanes __attribute__((vector_size(32)));
+constexpr std::ptrdiff_t kLanes = sizeof(Lanes) / sizeof(double);
 
-[[gnu::always_inline]] inline void load(Rows& rows, const double* from) {
+[[gnu::always_inline]] inline void load(Lanes& rows, const double* from) {
   std::memcpy(&rows, from, sizeof rows);
 }
 
@@ -24,10 +24,10 @@ template <int P, int Q>
 [[gnu::always_inline]] inline void add_products(const double* basis, const double* x, std::ptrdiff_t height,
                                                 std::ptrdiff_t count, double* products,
                                                 std::ptrdiff_t stride) {
-  Rows sum[P][Q] = {};
+  Lanes sum[P][Q] = {};
   std::ptrdiff_t k = 0;
-  for (; k + kRows <= count; k += kRows) {
-    Rows b[P], y[Q];
+  for (; k + kLanes <= count; k += kLanes) {
+    Lanes b[P], y[Q];
     for (int p = 0; p < P; ++p) load(b[p], basis + p * height + k);
     for (int q = 0; q < Q; ++q) load(y[q], x + q * height + k);
     for (int p = 0; p < P; ++p)
@@ -46,8 +46,8 @@ template <int P>
 [[gnu::always_inline]] inline void subtract(const double* basis, std::ptrdiff_t height, std::ptrdiff_t count,
                                             const double* share, double* y) {
   std::ptrdiff_t k = 0;
-  for (; k + kRows <= count; k += kRows) {
-    Rows left, b;
+  for (; k + kLanes <= count; k += kLanes) {
+    Lanes left, b;
     load(left, y + k);
     for (int p = 0; p < P; ++p) {
       load(b, basis + p * height + k);
@@ -91,11 +91,11 @@ ISAC_SIMD void subtract_block(const double* basis, double* x, std::ptrdiff_t hei
 
 void take_out(const Eigen::MatrixXd& basis, Eigen::MatrixXd& x) {
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(basis.cols(), x.cols());
-  for (Eigen::Index from = 0; from < x.rows(); from += kBlock)
-    add_block(basis.data() + from, x.data() + from, x.rows(), std::min(kBlock, x.rows() - from), basis.cols(),
-              x.cols(), products.data());
-  for (Eigen::Index from = 0; from < x.rows(); from += kBlock)
-    subtract_block(basis.data() + from, x.data() + from, x.rows(), std::min(kBlock, x.rows() - from),
+  for (Eigen::Index from = 0; from < x.rows(); from += kRowsAtOnce)
+    add_block(basis.data() + from, x.data() + from, x.rows(), std::min(kRowsAtOnce, x.rows() - from),
+              basis.cols(), x.cols(), products.data());
+  for (Eigen::Index from = 0; from < x.rows(); from += kRowsAtOnce)
+    subtract_block(basis.data() + from, x.data() + from, x.rows(), std::min(kRowsAtOnce, x.rows() - from),
                    basis.cols(), x.cols(), products.data());
 }
 
