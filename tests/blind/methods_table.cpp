@@ -51,7 +51,7 @@ std::string methods_table(const std::vector<Case>& cases) {
   std::map<std::string, Row> rows;
   for (const Case& one : cases) {
     if (!one.truth.testable || one.baselines.empty()) continue;
-    if (one.answer.failed != "not asked") count(one, rows[kOurs]);
+    if (one.answer.failed != kNotAsked) count(one, rows[kOurs]);
     for (const auto& [method, answer] : one.baselines) count({one.truth, answer}, rows[method]);
   }
   if (rows.empty()) return "";

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 
@@ -216,34 +217,16 @@ std::string gaps(const Group& hidden) {
          rows + "\n";
 }
 
-std::string reliability(const Group& all) {
-  struct Bin {
-    double count = 0, hits = 0, stated = 0;
-  } bins[10];
-  double count = 0.0;
-  for (const Scored& s : all) {
-    if (s.one->truth.kind == "left_out") continue;  // no name could be right
-    for (std::size_t i = 0; i < s.one->answer.effects.size(); ++i) {
-      const double c = s.one->answer.confidences[i];
-      Bin& bin = bins[std::clamp(static_cast<int>(c * 10.0), 0, 9)];
-      const auto& ids = s.one->truth.ids;
-      ++bin.count;
-      ++count;
-      bin.stated += c;
-      bin.hits += std::find(ids.begin(), ids.end(), s.one->answer.effects[i]) != ids.end() &&
-                  s.one->truth.kind != "unknown";
-    }
-  }
-  if (count == 0.0) return "";
+std::string confidences(const Reliability& names, const std::string& picture) {
+  if (names.bins.empty()) return "";
   std::string text = "## Confidences of what was named\n\n| stated | mean stated | right |\n|---|---|---|\n";
-  double error = 0.0;
-  for (int i = 0; i < 10; ++i) {
-    if (bins[i].count == 0.0) continue;
-    error += std::abs(bins[i].stated - bins[i].hits) / count;
-    text += "| " + fixed(0.1 * i, 1) + " to " + fixed(0.1 * (i + 1), 1) + " | " +
-            fixed(bins[i].stated / bins[i].count, 3) + " | " + share(bins[i].hits, bins[i].count) + " |\n";
-  }
-  return text + "\nExpected calibration error: " + fixed(error, 3) + "\n\n";
+  for (const Reliability::Bin& bin : names.bins)
+    text += "| " + fixed(bin.low, 1) + " to " + fixed(bin.low + 0.1, 1) + " | " + fixed(bin.stated, 3) +
+            " | " + share(bin.right, bin.count) + " |\n";
+  text += "\nExpected calibration error: " + fixed(names.error, 3) + "\n\n";
+  if (!picture.empty())
+    text += "![Share of right names over the confidence stated, against the diagonal](" + picture + ")\n\n";
+  return text;
 }
 
 std::string confusion(const Group& all) {
@@ -279,7 +262,34 @@ std::string confusion(const Group& all) {
 
 }  // namespace
 
-std::string report(const std::vector<Case>& cases) {
+Reliability reliability(const std::vector<Case>& cases) {
+  std::array<Reliability::Bin, 10> bins;
+  double count = 0.0;
+  for (const Case& one : cases) {
+    if (!one.truth.testable || one.truth.kind == "left_out") continue;
+    const auto& ids = one.truth.ids;
+    for (std::size_t i = 0; i < one.answer.effects.size(); ++i) {
+      const double c = one.answer.confidences[i];
+      Reliability::Bin& bin = bins[static_cast<std::size_t>(std::clamp(static_cast<int>(c * 10.0), 0, 9))];
+      bin.count += 1;
+      bin.stated += c;
+      bin.right += std::find(ids.begin(), ids.end(), one.answer.effects[i]) != ids.end() &&
+                   one.truth.kind != "unknown";
+      count += 1;
+    }
+  }
+  Reliability names;
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    if (bins[i].count == 0.0) continue;
+    names.error += std::abs(bins[i].stated - bins[i].right) / count;
+    names.bins.push_back(bins[i]);
+    names.bins.back().low = 0.1 * static_cast<double>(i);
+    names.bins.back().stated /= bins[i].count;
+  }
+  return names;
+}
+
+std::string report(const std::vector<Case>& cases, const std::string& picture) {
   Group asked;
   std::map<std::string, int> silent;
   std::set<std::string> untestable;
@@ -289,6 +299,7 @@ std::string report(const std::vector<Case>& cases) {
       for (const std::string& id : one.truth.ids) untestable.insert(id);
       continue;
     }
+    if (one.answer.failed == kNotAsked) continue;  // baselines alone were
     asked.push_back({&one, judge_case(one)});
     if (!one.answer.failed.empty()) ++silent[one.answer.failed];
     if (one.answer.seconds > 0.0) seconds.push_back(one.answer.seconds);
@@ -306,7 +317,7 @@ std::string report(const std::vector<Case>& cases) {
   text += pairs(of_kind("pair")) + outside(of_kind("unknown")) + left_out(of_kind("left_out"));
   text += gaps(only(
       asked, [](const Scored& s) { return s.one->truth.kind == "single" || s.one->truth.kind == "pair"; }));
-  text += methods_table(cases) + reliability(asked) + confusion(asked);
+  text += methods_table(cases) + confidences(reliability(cases), picture) + confusion(asked);
   if (!untestable.empty()) {
     text += "Not testable at the strength asked for, so left out (some or all datasets):";
     for (const std::string& id : untestable) text += " " + id;

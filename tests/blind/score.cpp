@@ -155,7 +155,7 @@ Case read_case(const std::string& line) {
     one.answer.seconds = number(j, "seconds");
     if (number(j, "exit") < -1.5) one.answer.failed = "killed: too slow";
   } else {
-    one.answer.failed = "not asked";
+    one.answer.failed = kNotAsked;
   }
   if (j.contains("bare")) one.floor = read_floor(j["bare"].get<std::string>());
   if (j.contains("baselines") && j["baselines"].is_object())
@@ -218,6 +218,27 @@ Judgement judge_case(const Case& one) {
                    (!subsystem.empty() && (subsystem == "sensor") == (t.side == "sensor"));
   if (t.kind == "left_out") j.tied = j.asserted && holds(t.equals, a.effects.front());
   return j;
+}
+
+void join_asked_alone(std::vector<Case>& cases) {
+  const auto alone = [](const Case& one) { return one.answer.failed == kNotAsked; };
+  std::map<std::string, Case*> answered;
+  for (Case& one : cases)
+    if (!alone(one)) answered.emplace(one.truth.key, &one);
+  std::vector<bool> joined(cases.size());
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    const auto other = alone(cases[i]) ? answered.find(cases[i].truth.key) : answered.end();
+    if (other == answered.end()) continue;
+    other->second->baselines.insert(cases[i].baselines.begin(), cases[i].baselines.end());
+    joined[i] = true;
+  }
+  std::size_t at = 0;
+  std::erase_if(cases, [&](const Case&) { return joined[at++]; });
+}
+
+std::string seed_of_key(const std::string& key) {
+  const std::size_t from = key.rfind('/') + 1, to = key.rfind('.');
+  return to == std::string::npos || to < from ? "" : key.substr(from, to - from);
 }
 
 }  // namespace blind

@@ -26,6 +26,8 @@ struct Truth {
   std::map<std::string, double> gap, gap_noise, gap_closes;
 };
 
+inline constexpr const char* kNotAsked = "not asked";  ///< `failed` where baselines were asked alone
+
 /// What an answer says. `failed` is not empty when there is none.
 struct Answer {
   std::string failed, verdict, where, signal;
@@ -88,7 +90,27 @@ PDistance p_distance(std::vector<double> p_values);
 /// Every baseline beside the answer, on the datasets that both were given: a table as Markdown, empty where there is none.
 std::string methods_table(const std::vector<Case>& cases);
 
-/// All tables, as Markdown.
-std::string report(const std::vector<Case>& cases);
+/// Names (the first effects of answers) by the confidence that was stated: are they right as often as that? Left-out effects do not count,
+/// for no name could be right.
+struct Reliability {
+  struct Bin {
+    double low = 0;     ///< of a tenth: 0.9 ≤ stated ≤ 1
+    double stated = 0;  ///< mean
+    double right = 0, count = 0;
+  };
+  std::vector<Bin> bins;  ///< those with a name in them
+  double error = 0;       ///< expected calibration error: mean of |stated − right|, by names
+};
+Reliability reliability(const std::vector<Case>& cases);
+
+/// All tables, as Markdown. `picture`: where the reliability diagram will be found from the page, or empty.
+std::string report(const std::vector<Case>& cases, const std::string& picture = "");
+
+/// Datasets of which baselines and the program were asked one by one are one case again: `baselines` of a case that was not asked go to
+/// the answered case of the same key, if there is one.
+void join_asked_alone(std::vector<Case>& cases);
+
+/// The seed in a case's key ("clear/white/leak/9312.0": 9312), or an empty text.
+std::string seed_of_key(const std::string& key);
 
 }  // namespace blind

@@ -280,6 +280,49 @@ TEST(Score, puts_every_baseline_beside_the_answer_on_the_same_dataset) {
   EXPECT_TRUE(methods_table({one, none}).empty());
 }
 
+TEST(Score, holds_stated_confidences_against_what_was_right) {
+  std::vector<Case> cases(6, single("creep"));
+  for (Case& one : cases) one.answer = named({"creep"});
+  for (Case& one : cases) one.answer.confidences = {0.96};
+  cases[1].answer.confidences = {1.0};  // belongs to the highest tenth
+  cases[2].answer.effects = {"leak"};
+  cases[3].truth.kind = "unknown";  // no name can be right
+  cases[3].answer.confidences = {0.44};
+  cases[4].truth.kind = "left_out";  // does not count
+  cases[5].truth.testable = false;   // nor does this
+  const Reliability names = reliability(cases);
+  ASSERT_EQ(names.bins.size(), 2u);
+  EXPECT_NEAR(names.bins[0].low, 0.4, 1e-12);
+  EXPECT_EQ(names.bins[0].right, 0.0);
+  EXPECT_NEAR(names.bins[1].stated, (0.96 + 1.0 + 0.96) / 3, 1e-12);
+  EXPECT_EQ(names.bins[1].right, 2.0);
+  EXPECT_EQ(names.bins[1].count, 3.0);
+  EXPECT_NEAR(names.error, (0.44 + std::abs(2.92 - 2.0)) / 4, 1e-12);
+  EXPECT_TRUE(reliability({}).bins.empty());
+}
+
+TEST(Score, joins_what_baselines_said_alone_to_the_answer_about_the_same_dataset) {
+  std::vector<Case> cases(4, single("creep"));
+  for (std::size_t i = 0; i < 4; ++i) cases[i].truth.key = "clear/white/creep/9312." + std::to_string(i % 2);
+  cases[0].answer = named({"creep"});
+  cases[1].answer.failed = kNotAsked;  // of a dataset that nobody answered: stays
+  cases[1].baselines["B1"] = named({"leak"});
+  cases[2].answer.failed = kNotAsked;
+  cases[2].baselines["B1"] = named({"hysteresis"});
+  cases.pop_back();
+  join_asked_alone(cases);
+  ASSERT_EQ(cases.size(), 2u);
+  EXPECT_EQ(cases[0].answer.effects, std::vector<std::string>{"creep"});
+  EXPECT_EQ(cases[0].baselines["B1"].effects, std::vector<std::string>{"hysteresis"});
+  EXPECT_EQ(cases[1].answer.failed, kNotAsked);
+}
+
+TEST(Score, reads_the_seed_of_a_dataset_from_its_key) {
+  EXPECT_EQ(seed_of_key("clear/white/leak/9312.0"), "9312");
+  EXPECT_EQ(seed_of_key("none/white//5101.17"), "5101");
+  EXPECT_EQ(seed_of_key("k"), "");
+}
+
 TEST(Ledger, is_scored_as_the_whole_answer_is) {
   std::vector<Case> cases(5, single("creep"));
   for (std::size_t i = 0; i < cases.size(); ++i)
