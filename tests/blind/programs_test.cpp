@@ -177,6 +177,13 @@ TEST_F(Programs, make_the_tables_that_stand_in_the_documentation_of_what_was_mea
   // Of seed 6201, on which the program was mended, the page gives numbers and the ledger makes the tables.
   ASSERT_EQ(run("blind_score " + root + "/tests/blind/measured/*.jsonl"), 0) << text("complaint");
   EXPECT_NE(text("said").find("| clear | all | 205/208"), std::string::npos);
+  int methods = 0;
+  for (const std::string& line : lines("said"))
+    if (line.starts_with("| B") || line.starts_with("| isac-explain")) {
+      ++methods;
+      EXPECT_NE(told.find(line + "\n"), std::string::npos) << "docs/explain.md lacks: " << line;
+    }
+  EXPECT_EQ(methods, 8);
 }
 
 TEST(Blindness, is_kept_no_source_here_includes_anything_of_the_toolkit) {

@@ -77,6 +77,26 @@ TEST_F(ExplainOnTheRig, names_a_hidden_stiffness_with_its_number_and_shrinks_the
   EXPECT_GT(found["gap"]["share_closed"].get<double>(), 0.8);
 }
 
+/// The simulated hand rests at each end of a stroke and trembles by half a step of the encoder, and the counter gives the step below.
+TEST_F(ExplainOnTheRig, names_dry_friction_though_the_hand_trembles_where_it_turns) {
+  log("seed=11,effect=coulomb_friction:0.02", {"all"});
+  const json found = explain();
+  EXPECT_EQ(found["verdict"], "named") << found["summary"];
+  ASSERT_EQ(ids(found["effects"]), std::vector<std::string>{"coulomb_friction"});
+  EXPECT_NEAR(found["effects"][0]["parameters"]["T_c"]["value"].get<double>(), 0.02, 0.001);
+  EXPECT_LT(found["gap"]["heldout_after"].get<double>(), 0.7 * found["gap"]["heldout_before"].get<double>());
+}
+
+TEST_F(ExplainOnTheRig, leaves_half_a_step_of_the_encoder_to_the_recorder_beside_an_effect_too) {
+  log("seed=11,effect=torque_ripple:0.01:0:16", {"all"});
+  const json found = explain();
+  EXPECT_EQ(found["verdict"], "named") << found["summary"];
+  ASSERT_EQ(ids(found["effects"]), std::vector<std::string>{"torque_ripple"});
+  EXPECT_TRUE(found["alternatives"].empty()) << found["summary"];
+  EXPECT_NE(found["summary"].get<std::string>().find("how the recorder counts"), std::string::npos)
+      << found["summary"];
+}
+
 TEST_F(ExplainOnTheRig, tells_two_effects_apart_after_the_one_sweep_that_it_asks_for) {
   const std::string effect = ",effect=muscle_asymmetry:3.6e-6";
   log_first_afternoon("seed=5" + effect);

@@ -1,6 +1,7 @@
 // explain_ties: hides one effect after another in the simulated rig, records the first afternoon of the tutorial, and where the
 // answer leaves a tie, records what it asks for and asks again. Prints one row of a Markdown table per dataset.
 //   explain_ties [seeds per effect, default 2]
+// With `sweeps` for the seeds: records all sweeps of a rig with each of these and other effects, three of them held out, and asks once.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -29,6 +30,28 @@ constexpr const char* kHidden[] = {"effect=muscle_asymmetry:3.6e-6",
                                    "effect=encoder_play:0.003",
                                    "effect=lever_arm_variation:0.01:0.02",
                                    "effect=torque_ripple:0.01:0:16"};
+
+/// Beside those, as large as a rig may have them.
+constexpr const char* kHiddenInSweeps[] = {"effect=coulomb_friction:0.02",
+                                           "effect=pressure_dependent_friction:0.02:1",
+                                           "effect=stribeck_friction:0.015:0.03:0.3",
+                                           "effect=hysteresis:0.02:0.05",
+                                           "effect=creep:0.3:10",
+                                           "effect=bearing_friction:0.02",
+                                           "effect=quadratic_damping:0.02",
+                                           "effect=cubic_stiffness:0.4",
+                                           "effect=gravity_imbalance:0.05",
+                                           "effect=torque_offset:0.02",
+                                           "effect=muscle_asymmetry:3.6e-6",
+                                           "effect=lever_arm_variation:0.01:0.02",
+                                           "effect=torque_ripple:0.01:0:16",
+                                           "effect=encoder_play:0.004",
+                                           "effect=dead_time:0.01",
+                                           "effect=second_order_lag:0.02",
+                                           "effect=asymmetric_fill_vent:1.3",
+                                           "effect=valve_deadband:4e3",
+                                           "effect=volume_coupling:4e3",
+                                           "effect=crosstalk:0.01"};
 
 std::vector<std::string> names(const json& answer) {
   std::vector<std::string> out;
@@ -62,9 +85,35 @@ json ask(const std::string& dataset, const std::string& plan) {
   return json::parse(run.out, nullptr, false);
 }
 
+int ask_of_all_sweeps() {
+  std::printf("| hidden | named | or | held-out gap before, after |\n| --- | --- | --- | --- |\n");
+  for (const std::string hidden : kHiddenInSweeps) {
+    const isac::test::ScratchFolder folder;
+    const std::string dataset = folder / "dataset";
+    const auto run = isac::test::run_program(
+        {"isac-log", "all", "--card", "sim:seed=11," + hidden, "--rig", kRig, "-o", dataset});
+    const json answer = run.exit_code == 0 ? ask(dataset, folder / "next.toml") : json();
+    if (!answer.is_object() || !answer.contains("effects")) {
+      std::fprintf(stderr, "%s: no answer\n", hidden.c_str());
+      return 1;
+    }
+    std::vector<std::string> named, or_else;
+    for (const json& one : answer["effects"]) named.push_back(one["id"]);
+    for (const json& one : answer["alternatives"]) or_else.push_back(one["id"]);
+    const json& gap = answer["gap"];
+    std::printf("| %s | %s | %s | %.4f, %.4f %s |\n", hidden.c_str() + 7,
+                named.empty() ? answer["verdict"].get<std::string>().c_str() : joined(named).c_str(),
+                joined(or_else).c_str(), gap["heldout_before"].get<double>(),
+                gap["heldout_after"].get<double>(), gap["unit"].get<std::string>().c_str());
+    std::fflush(stdout);
+  }
+  return 0;
+}
+
 }  // namespace
 
 int main(int count, char** words) {
+  if (count > 1 && std::string(words[1]) == "sweeps") return ask_of_all_sweeps();
   const int seeds = count > 1 ? std::atoi(words[1]) : 2;
   const std::string first =
       std::string(ISAC_SOURCE_DIR) + "/docs/tutorials/tell-two-effects-apart/first.toml";

@@ -63,6 +63,35 @@ bool Search::is_convention(const Step& step) {
   return false;
 }
 
+bool Search::begins_anew_beside_half_a_step(const Step& step) {
+  if (found_.added.empty() || !step.gate.significant || half_a_step_is_free() ||
+      !data_.baseline.terms.empty() || library_.tolerances.size() + 1 > library_.tolerances.capacity())
+    return false;
+  for (const int added : found_.added) {
+    const std::string& id = library_.hypotheses[static_cast<std::size_t>(added)].id();
+    if (id == "encoder_offset" || nests(id, "torque_offset")) return false;
+  }
+  const double half = 0.5 * data_.rig.angle_step;
+  const auto offset = std::find_if(step.trials.begin(), step.trials.end(), [&](const Trial& t) {
+    return t.in_set && ranking_.id_of(t) == "encoder_offset";
+  });
+  if (offset == step.trials.end() || !(std::abs(std::abs(offset->values[0]) - half) < kConvention * half))
+    return false;
+  tolerate(library_, data_, "encoder_offset", -half, half);
+  const std::string sentence =
+      fmt::format("of {:.3g} rad, half a step, {}", offset->values[0], kLeftToTheRecorder);
+  say("encoder_offset: " + sentence);
+  found_.steps.clear();
+  found_.added.clear();
+  found_.notes.clear();
+  found_.notes.push_back({"encoder_offset", sentence});
+  first_size_ = largest_size_ = largest_units_ = 0;
+  responses_.forget();
+  found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+  move_to(found_.baseline);
+  return true;
+}
+
 void Search::doubt_the_clock() {
   auto& tolerances = library_.tolerances;
   const auto skew = std::find_if(tolerances.begin(), tolerances.end(),
@@ -127,6 +156,11 @@ void Search::keep_what_holds_an_offset() {
   }
 }
 
+bool Search::half_a_step_is_free() const {
+  return std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
+                     [](const Hypothesis& h) { return h.id() == "encoder_offset" && h.upper[0] > 0; });
+}
+
 bool Search::leave_half_a_step(bool asked_for) {
   if (found_.added.empty() || !std::isfinite(data_.rig.angle_step) || !data_.baseline.terms.empty())
     return false;
@@ -137,10 +171,8 @@ bool Search::leave_half_a_step(bool asked_for) {
     const std::string id = a.hypothesis->id();
     return id == "encoder_offset" || id == "torque_offset";
   });
-  const bool there =
-      std::any_of(library_.tolerances.begin(), library_.tolerances.end(),
-                  [](const Hypothesis& h) { return h.id() == "encoder_offset" && h.upper[0] > 0; });
-  if (an_offset || there || library_.tolerances.size() + 1 > library_.tolerances.capacity()) return false;
+  if (an_offset || half_a_step_is_free() || library_.tolerances.size() + 1 > library_.tolerances.capacity())
+    return false;
   const double half = 0.5 * data_.rig.angle_step, without = found_.model.loss;
   const auto within = [&](double low, double high) {
     tolerate(library_, data_, "encoder_offset", low, high);

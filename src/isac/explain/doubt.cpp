@@ -200,6 +200,7 @@ void doubt_what_is_left(const Predictor& predictor, const Library& library, cons
                                         .seed = options.seed,
                                         .threads = options.threads});
   const auto much = [&](const LeftOver& l) {
+    if (found.blurred && l.size <= found.steps.back().gate.size) return false;
     return casts_a_doubt(l.p_value, l.size, l.chain, found.steps.front().trials.front().material,
                          predictor.data().baseline.terms.empty());
   };

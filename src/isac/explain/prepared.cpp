@@ -19,7 +19,11 @@ constexpr double kRowRate = 125;         // Hz: beyond it the kernel has left no
 constexpr double kTurningWindow = 0.08;  // s to either side
 constexpr double kSlack = 2.0,
                  kCarries = 20.0;  // N: a sensor that carries this much as a rule and reads less hangs slack
-constexpr double kRestingKernel = 0.15;    // s, for pressures that rest
+constexpr double kRestingKernel = 0.15;  // s, for pressures that rest
+// A led joint's direction is untold where fewer encoder steps than these lie within ± the window, for longer than a turn takes; and beside that
+// up to kBeside times as many. Of longer stands the first and the last kUntold are.
+constexpr double kTellWindow = 0.05, kFewSteps = 2.5, kBeside = 2, kSlowTurn = 0.1, kUntold = 0.5;  // s
+constexpr double kMoreThanAFew = 0.03;     // of a run
 constexpr double kPressureSettling = 0.4;  // s at the start of a run in which p(0) is still felt
 
 /// Does what reads less than kSlack lie where nothing pulls? A reading that goes on falling below zero is one of a sensor that is pushed.
@@ -84,6 +88,38 @@ double first_pressure(const std::vector<double>& pressure, const std::vector<dou
   const double det = s1 * sgg - sg * sg, c1 = (s1 * sgp - sg * sp) / det, c0 = (sp - c1 * sg) / s1;
   const double scatter = std::sqrt(std::max(0.0, spp - c0 * sp - c1 * sgp) / s1);
   return pressure[0] + (std::abs(c1) > kFarMore * scatter ? c0 + c1 : sp / s1);
+}
+
+/// A joint that is led slowly through its turns is, for a while, where nobody can tell whether it goes on, stands or trembles: its dry friction
+/// may have either sign. Such moments, up to kUntold from motion, do not count in the torque of a run in which they are more than a few. (Where
+/// a joint stands for longer it stays: its creep is seen there.)
+void leave_out_slow_turns(PreparedRun& run, double angle_step) {
+  const std::vector<double>& angle = run.raw_angle;
+  const std::size_t n = angle.size();
+  if (!(std::isfinite(angle_step) && angle_step > 0) || n == 0) return;
+  const auto samples = [&](double seconds) { return static_cast<std::size_t>(seconds / run.interval); };
+  const std::size_t half = samples(kTellWindow), least = samples(kSlowTurn), reach = samples(kUntold);
+  const auto steps = [&](std::size_t k) {
+    return std::abs(angle[std::min(n - 1, k + half)] - angle[k - std::min(k, half)]) / angle_step;
+  };
+  std::vector<std::size_t> untold;
+  for (std::size_t k = 0; k < n;) {
+    if (steps(k) > kFewSteps) {
+      ++k;
+      continue;
+    }
+    std::size_t from = k;
+    while (k < n && steps(k) <= kFewSteps) ++k;
+    std::size_t to = k;
+    if (to - from < least) continue;
+    while (from > 0 && steps(from - 1) <= kBeside * kFewSteps) --from;
+    while (to < n && steps(to) <= kBeside * kFewSteps) ++to;
+    for (std::size_t j = from; j < to; ++j)
+      if ((from > 0 && j - from < reach) || (to < n && to - j <= reach)) untold.push_back(j);
+  }
+  if (static_cast<double>(untold.size()) < kMoreThanAFew * static_cast<double>(n)) return;
+  for (const std::size_t j : untold) run.loaded[j] = 0;
+  run.untold = static_cast<double>(untold.size()) * run.interval;
 }
 
 PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
@@ -196,6 +232,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
       for (std::size_t i = k - std::min(k, reach); i < std::min(n, k + reach + 1); ++i) run.loaded[i] = 0;
     }
   }
+  if (!run.is_free) leave_out_slow_turns(run, rig.angle_step);
   return run;
 }
 
@@ -244,6 +281,12 @@ void add_rows(Prepared& data) {
 
 bool Prepared::has(Chain chain) const noexcept {
   return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.chain == chain; });
+}
+
+double Prepared::untold() const noexcept {
+  double seconds = 0;
+  for (const PreparedRun& run : runs) seconds += run.untold;
+  return seconds;
 }
 
 bool can_add_torque_of_free_runs(const Prepared& data) {

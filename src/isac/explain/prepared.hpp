@@ -69,7 +69,10 @@ struct PreparedRun {
   std::vector<double> smooth_torque;  ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
   Motion swing;  ///< of a free joint, for what swings on it (filters.hpp, `quiet_motion`); may be empty
-  std::vector<unsigned char> loaded;  ///< 0 where a force sensor hangs slack: it cannot read a push
+  /// 0 where a force sensor hangs slack, which cannot read a push, and where a led joint's direction is untold.
+  std::vector<unsigned char> loaded;
+  double untold =
+      0;  ///< s of a led run's slow turns, in which the encoder does not tell its direction: left out of the torque
   std::vector<unsigned char> usable;  ///< 0 beside gaps and edges
 };
 
@@ -99,6 +102,7 @@ struct Prepared {
   bool with_free_torque = false;                 ///< see add_torque_of_free_runs
 
   [[nodiscard]] bool has(Chain chain) const noexcept;
+  [[nodiscard]] double untold() const noexcept;  ///< s, of all runs
 };
 
 /// Runs that no fit, test or choice has seen. Only prove() (proof.hpp) opens them.

@@ -202,8 +202,10 @@ void Search::hold_against_functions(const Around& baseline) {
     parameters += ranking_.parameters_of(named) + (i > 0 ? kChoosingOne : 0);
     common &= together_with(chains_of(named));
   }
-  const Eigen::VectorXd left = found_.added.size() == 1 ? found_.steps.front().trials.front().residual
-                                                        : baseline.project(found_.model.residual);
+  // (A trial does not know of half a step of the encoder that was left to it later; the functions do.)
+  const bool as_tried = found_.added.size() == 1 && !half_a_step_is_free();
+  const Eigen::VectorXd left =
+      as_tried ? found_.steps.front().trials.front().residual : baseline.project(found_.model.residual);
   const Comparison behind = behind_generic(data_, left, parameters, generic);
   const bool alike = behind.separation < kTwinLimit;
   if (alike && generic.functions.size() < found_.added.size() && common != 0)
@@ -292,7 +294,7 @@ void Search::look_at_remainder() {
   if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
   const Gate& gate = found_.steps.back().gate;
   const double p = gate.p_value;
-  if (left_elsewhere_) return;  // told already
+  if (left_elsewhere_ || found_.blurred) return;  // told already
   const Gatekeeper::Sized left =
       gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
   const bool joint = data_.baseline.terms.empty(),

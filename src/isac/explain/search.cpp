@@ -32,6 +32,10 @@ Found Search::run() {
   found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
   choose_blocks(found_.baseline.residual);
   say(fmt::format("baseline fitted to {} rows of {} runs", data_.rows.size(), data_.runs.size()));
+  if (data_.untold() > 0)
+    say(fmt::format(
+        "{:.1f} s of slow turns, in which the encoder does not tell a direction, are left out of the torque",
+        data_.untold()));
   place_slip(library_, data_, found_.baseline.residual);
   move_to(found_.baseline);
   take_first_colour();
@@ -154,11 +158,16 @@ void Search::forward() {
                            step.gate.size));
     report(step.trials);
     found_.adequate = !open;
+    found_.blurred = is_blur_of_slow_turns(step);
+    if (found_.blurred)
+      say(fmt::format("It is {:.1g} of what was found: where the joint turns slowly nobody can tell.",
+                      units_closed(step.trials.front()) / largest_units_));
     if (!open && (no_zero_wanders_beside_it() || slow_noise_hid_another(step))) {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }
     if (open && found_.added.empty() && is_convention(step)) continue;
+    if (begins_anew_beside_half_a_step(step)) continue;
     if (open && found_.added.size() < 2 && a_wandering_zero_was_hidden_by(step)) {
       if (found_.wants_torque_of_free_runs) return;
       continue;
@@ -280,10 +289,17 @@ void Search::leave_a_little(const Step& step) {
 }
 
 bool Search::is_open(const Step& step) const {
-  if (!step.gate.significant || !step.gate.material) return false;
+  if (!step.gate.significant || !step.gate.material || is_blur_of_slow_turns(step)) return false;
   if (found_.added.empty() || is_worth_a_second_name(step)) return true;
   return step.gate.size >= small_in(step.gate.chain) &&
          (!leaves_over_in(bit(step.gate.chain)) || step.units >= kHardlyAnything * largest_units_);
+}
+
+bool Search::is_blur_of_slow_turns(const Step& step) const {
+  const bool dry = std::any_of(found_.added.begin(), found_.added.end(),
+                               [&](int h) { return library_.hypotheses[static_cast<std::size_t>(h)].dry; });
+  return dry && data_.untold() > 0 && !step.trials.empty() && leaves_over_in(bit(step.gate.chain)) &&
+         units_closed(step.trials.front()) < kHardlyAnything * largest_units_;
 }
 
 bool Search::leaves_over_in(unsigned chains) const {

@@ -32,9 +32,11 @@ struct Found {
   Fit baseline, model;
   Weights weights;
   Floors floors;
-  std::vector<Step> steps;      ///< one for each effect that was added, and the last that was not
-  std::vector<int> added;       ///< hypotheses, in order
-  bool adequate = true;         ///< nothing significant and material is left
+  std::vector<Step> steps;  ///< one for each effect that was added, and the last that was not
+  std::vector<int> added;   ///< hypotheses, in order
+  bool adequate = true;     ///< nothing significant and material is left
+  /// Beside dry friction is left what nobody can tell from it where a joint turns slowly, and no more.
+  bool blurred = false;
   bool comes_and_goes = false;  ///< something named was not of one size throughout (constancy.hpp)
   bool another_pair =
       false;  ///< what closed most alone left little, or too little for a second name: two others took its place

@@ -98,16 +98,22 @@ class Search {
   /// A skew within half a sample is tolerated, so that it stands for nothing else; where nothing else is missing and the skew is neither hardly
   /// any nor the half sample of a recorder's convention, it is looked for as the effect that it is. What is found in its place stays if it leaves less.
   void doubt_the_clock();
+  /// Left over beside dry friction, in runs with slow turns, and less than the friction's own equation tells.
+  bool is_blur_of_slow_turns(const Step& step) const;
   /// Beside an effect, an offset of less than half a step may be how the encoder is read; beside one that holds an offset of its own, of less than a step.
   /// In steps; 0: none is asked for.
   double offset_within_a_step(const Step& step) const;
   /// An offset that is left to how the encoder is read may be part of a general case of what was named: a hysteresis that differs by direction is
   /// one that does not and an offset. It stays in the set.
   void keep_what_holds_an_offset();
+  /// A counter that gives the step below reads half a step low, which beside an effect is large or small as the noise is: what was found is looked
+  /// for anew beside it.
+  bool begins_anew_beside_half_a_step(const Step& step);
   /// How an encoder is read within its step stays unknown where nothing told: what was found is refitted beside half a step of the zero,
   /// so that its numbers and their intervals know it. (An offset itself would lose half a step to it.) It stays in the middle of the step unless
   /// the runs tell more; then it is the mean of what they and the step say. A remainder may have `asked_for` it.
   bool leave_half_a_step(bool asked_for);
+  [[nodiscard]] bool half_a_step_is_free() const;
 
   // One step: search_step.cpp; what it takes for noise: search_noise.cpp.
   void choose_blocks(const Eigen::VectorXd& residual);

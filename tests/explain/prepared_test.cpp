@@ -1,0 +1,79 @@
+// Which moments of a run count, where an encoder of finite steps does not tell which way a led joint goes.
+#include "isac/explain/prepared.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tied_data.hpp"
+
+namespace isac::explain {
+namespace {
+
+constexpr double kInterval = 0.002;
+
+/// A run of 20 s whose angle is given, read in steps.
+Prepared prepared(const std::string& experiment, const std::function<double(double)>& angle) {
+  const test::TiedRig rig;
+  series::Recording run;
+  run.source = "run.csv";
+  run.metadata["experiment"] = experiment;
+  const char* names[] = {"time", "angle", "p1", "p2", "F1", "F2"};
+  const char* units[] = {"s", "rad", "Pa", "Pa", "N", "N"};
+  for (int c = 0; c < 6; ++c) run.columns.push_back({names[c], units[c], {}});
+  const double step = rig.facts().angle_step;
+  for (int k = 0; k < 10000; ++k) {
+    const double t = kInterval * k;
+    const double row[] = {t, step * std::floor(angle(t) / step), rig.p0, rig.p0, 100, 100};
+    for (std::size_t c = 0; c < 6; ++c) run.columns[c].values.push_back(row[c]);
+  }
+  return prepare({&run, 1}, rig.facts(), {}, 2.0);
+}
+
+/// There and back between ±0.3 rad at 0.6 rad/s, with a pause at each end in which the hand trembles by less than a step.
+double led(double t, double pause) {
+  const double stroke = 1.0, turn = std::fmod(t, 2 * (stroke + pause));
+  const double at = turn < stroke + pause ? turn : turn - stroke - pause;
+  const double way = turn < stroke + pause ? 1 : -1;
+  const double s = std::min(at / stroke, 1.0);
+  return way * 0.3 * (2 * (s * s * s * (10 - 15 * s + 6 * s * s)) - 1) + 2e-4 * std::sin(62.0 * t);
+}
+
+TEST(SlowTurns, of_a_led_joint_do_not_count_in_the_torque) {
+  const Prepared data = prepared("constant-pressure", [](double t) { return led(t, 0.6); });
+  const PreparedRun& run = data.runs.front();
+  // Of each 1.6 s the pause of 0.6 s, and 0.2 s on both sides of it in which the joint creeps.
+  EXPECT_NEAR(data.untold() / 20.0, 0.5, 0.15);
+  for (std::size_t k = 500; k < 9500; ++k) {
+    const double at = std::fmod(run.time[k], 1.6);
+    if (at > 0.3 && at < 0.7) EXPECT_EQ(run.loaded[k], 1) << run.time[k] << " s, in the middle of a stroke";
+    if (at > 1.1 && at < 1.5) EXPECT_EQ(run.loaded[k], 0) << run.time[k] << " s, in a pause";
+  }
+  EXPECT_EQ(std::count(run.usable.begin() + 500, run.usable.begin() + 9500, 0), 0)
+      << "pressures are read as ever";
+}
+
+TEST(SlowTurns, are_left_out_at_both_ends_of_a_long_stand_and_its_middle_stays) {
+  const Prepared data = prepared("constant-pressure", [](double t) { return led(t, 6.0); });
+  const PreparedRun& run = data.runs.front();
+  const auto counts_at = [&](double t) { return run.loaded[static_cast<std::size_t>(t / kInterval)] != 0; };
+  EXPECT_FALSE(counts_at(1.2));
+  EXPECT_TRUE(counts_at(4.0)) << "creep is seen there";
+  EXPECT_FALSE(counts_at(6.8));
+  EXPECT_TRUE(counts_at(7.5)) << "the next stroke";
+}
+
+TEST(SlowTurns, are_none_where_a_joint_turns_quickly_rests_throughout_or_is_free) {
+  // Between ±0.3 rad at 1 Hz: ten times quicker than a turn that hides a direction.
+  const auto quick = [](double t) { return 0.3 * std::sin(6.283185307179586 * t); };
+  EXPECT_EQ(prepared("constant-pressure", quick).untold(), 0.0);
+  EXPECT_EQ(prepared("constant-angle", [](double) { return 0.1; }).untold(), 0.0);
+  EXPECT_EQ(prepared("free", [](double t) { return led(t, 0.6); }).untold(), 0.0);
+}
+
+}  // namespace
+}  // namespace isac::explain
