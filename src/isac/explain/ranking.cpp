@@ -108,6 +108,16 @@ bool Ranking::are_two_causes_of_one(const Trial& general, const Trial& simple) c
                  .separation < kTwinLimit;
 }
 
+/// A friction that goes with the mean pressure is at one pressure what one is that does not: no general case of it, but another, which a run at another
+/// pressure tells.
+bool Ranking::is_another_at_this_pressure(const Trial& general, const Trial& simple) const {
+  constexpr double kGoesWithIt = 0.5;  // the power
+  return id_of(general) == "pressure_dependent_friction" && id_of(simple) == "coulomb_friction" &&
+         general.values[1] > kGoesWithIt &&
+         compare(data_, simple.residual, general.residual, 0, noise_density(data_, simple.residual))
+                 .separation < kTwinLimit;
+}
+
 void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const {
   if (trials.empty()) return;
   const auto least = std::min_element(trials.begin(), trials.end(),
@@ -154,6 +164,7 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
       for (const Trial& simple : trials)
         // (An offset and a gain of a force are as many numbers: neither is the simpler one.)
         if (simple.in_set && nests(id_of(t), id_of(simple)) && !are_two_causes_of_one(t, simple) &&
+            !is_another_at_this_pressure(t, simple) &&
             ((parameters_of(t) > parameters_of(simple) && t.behind.t > -kNestedDoubt) ||
              is_limit_case(t.hypothesis, t.values)))
           t.in_set = false;

@@ -65,6 +65,7 @@ class Ranking {
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   [[nodiscard]] bool is_likelier_cause(const Trial& trial, const Trial& than) const;
   [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;
+  [[nodiscard]] bool is_another_at_this_pressure(const Trial& general, const Trial& simple) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.
   void rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) const;
