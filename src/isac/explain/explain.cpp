@@ -213,9 +213,18 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   std::unique_ptr<Library> first_library;
   if (found.worth_another_look) {
     const ModelPoint valves = found.model.model;
+    std::optional<TrialNote> recorder;
     first_library = std::move(library_here);
     quiet = QuietPressure::learn(data, &valves, options.threads);
     library_here = std::make_unique<Library>(make_library(data, options.excluded));
+    // How the recorder counts is known by now, and among the contenders of another look it is not.
+    const auto counts = std::find_if(found.notes.begin(), found.notes.end(), [](const TrialNote& note) {
+      return note.id == "encoder_offset" && note.sentence.ends_with(kLeftToTheRecorder);
+    });
+    if (counts != found.notes.end()) {
+      recorder = *counts;
+      tolerate(*library_here, data, "encoder_offset", -0.5 * data.rig.angle_step, 0.5 * data.rig.angle_step);
+    }
     predictor_here = std::make_unique<Predictor>(data, options.threads);
     if (options.progress) options.progress("the torque is looked at once more, beside what the valves do");
     Look again;
@@ -232,6 +241,9 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
       again.notes = std::move(found.notes);
     }
     found = search(*predictor_here, *library_here, data, options, again);
+    if (recorder && std::none_of(found.notes.begin(), found.notes.end(),
+                                 [&](const TrialNote& note) { return note.sentence == recorder->sentence; }))
+      found.notes.push_back(*recorder);
   }
   const Library& library = *library_here;
   const Predictor& predictor = *predictor_here;
