@@ -5,7 +5,7 @@
 #
 #   sh tests/blind/benchmark.sh SEED [WORDS]      WORDS go to every blind_run: --noise white --effect leak,creep,root_damping
 #
-# About three and a half hours on two cores; started again it goes on where it stopped. Noise of a real residual needs ISAC_REAL_DATA.
+# Some three and a half hours on two cores, by what single tiers took; started again it goes on where it stopped. Noise of a real residual needs ISAC_REAL_DATA.
 #   BIN=build/dev/bin   the programs          RESULTS=build/blind/SEED   a line for each dataset
 #   PAGE=docs/explain.md                      EXPLAIN, BASELINES         other programs to be asked
 #   EMPTY=500 PAIRS=24  for each kind of noise      EACH=1   for each effect and kind of noise

@@ -24,6 +24,14 @@ bool holds(const std::vector<std::string>& list, const char* name) {
   return std::find(list.begin(), list.end(), name) != list.end();
 }
 
+/// All that an answer names or cannot rule out, by their ids.
+std::vector<std::string> told_by(const json& answer) {
+  std::vector<std::string> names = ids(answer["effects"]);
+  for (const std::string& id : ids(answer["alternatives"])) names.push_back(id);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
 class ExplainOnTheRig : public testing::Test {
  protected:
   void log(const std::string& card, std::vector<std::string> words) {
@@ -77,18 +85,15 @@ TEST_F(ExplainOnTheRig, names_a_hidden_stiffness_with_its_number_and_shrinks_the
   EXPECT_GT(found["gap"]["share_closed"].get<double>(), 0.8);
 }
 
-/// The simulated hand rests at each end of a stroke and trembles by half a step of the encoder, and the counter gives the step below.
 /// The simulated hand rests at each end of a stroke and trembles by half a step of the encoder, and the counter gives the step below. These
 /// recordings are at one mean pressure, where friction that goes with the pressure is like one that does not.
 TEST_F(ExplainOnTheRig, names_dry_friction_though_the_hand_trembles_where_it_turns) {
   const std::string effect = ",effect=pressure_dependent_friction:0.02:1";
   log_first_afternoon("seed=2" + effect);
   const json before = explain();
-  std::vector<std::string> tied = ids(before["effects"]);
-  for (const std::string& id : ids(before["alternatives"])) tied.push_back(id);
-  std::sort(tied.begin(), tied.end());
-  EXPECT_EQ(tied, (std::vector<std::string>{"coulomb_friction", "pressure_dependent_friction"}))
+  EXPECT_EQ(told_by(before), (std::vector<std::string>{"coulomb_friction", "pressure_dependent_friction"}))
       << before["summary"];
+  EXPECT_NE(before["warnings"].dump().find("slow_turns_left_out"), std::string::npos) << before["warnings"];
   EXPECT_GT(before["separation"]["expected_sigma"].get<double>(), 5);
 
   log("seed=102" + effect, {"--plan", folder_ / "next.toml"});
@@ -113,8 +118,7 @@ TEST_F(ExplainOnTheRig, tells_two_effects_apart_after_the_one_sweep_that_it_asks
   const std::string effect = ",effect=muscle_asymmetry:3.6e-6";
   log_first_afternoon("seed=5" + effect);
   const json before = explain();
-  std::vector<std::string> tied = ids(before["effects"]);
-  for (const std::string& id : ids(before["alternatives"])) tied.push_back(id);
+  const std::vector<std::string> tied = told_by(before);
   EXPECT_TRUE(holds(tied, "muscle_asymmetry")) << before["summary"];
   EXPECT_TRUE(holds(tied, "torque_offset")) << before["summary"];
   EXPECT_LT(before["separation"]["now_sigma"].get<double>(), 1);

@@ -258,6 +258,12 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   e.blocks = data.blocks;
   e.block_seconds = data.block_seconds;
   e.fitted_runs = data.runs.size();
+  if (data.untold() > 0)
+    e.warnings.push_back(
+        {"slow_turns_left_out",
+         fmt::format("{:.0f} s of slow turns, in which the encoder does not tell which way the joint "
+                     "goes, do not count in the torque.",
+                     data.untold())});
   e.not_testable = library.not_testable;
   e.p_value = found.gate.p_value;
   e.detected = found.gate.significant;

@@ -294,7 +294,8 @@ void Search::look_at_remainder() {
   if (!found_.adequate || found_.added.empty() || found_.steps.size() <= found_.added.size()) return;
   const Gate& gate = found_.steps.back().gate;
   const double p = gate.p_value;
-  if (left_elsewhere_ || found_.blurred) return;  // told already
+  if (left_elsewhere_) return;  // told already
+  if (found_.blurred) return;   // it is what slow turns leave of a friction that is found
   const Gatekeeper::Sized left =
       gate_.most_significant(found_.steps.back().screen, found_.weights, found_.floors);
   const bool joint = data_.baseline.terms.empty(),
