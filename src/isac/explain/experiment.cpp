@@ -16,6 +16,9 @@ constexpr double kTolerancePrior = 3;  // of half of what is tolerated, uniform
 constexpr double kUniform = 12;        // range² over variance
 constexpr std::size_t kMostModels = 4;
 constexpr double kNothing = 1e9;  // s: no time suffices
+// Twenty of the blocks by whose scatter the search tells two models apart: what a recording has of its own (half a step of the encoder, a zero that
+// wanders) is in few blocks as sure as the difference is.
+constexpr double kFewest = 40;  // s of a run
 
 double round_to(double value, double step) {
   return step * std::round(value / step);
@@ -240,8 +243,8 @@ namespace {
 double seconds_needed(double before, double after, double wanted, const PlannedRun& run) {
   const double gained = after * after - before * before;
   if (!(gained > 1e-9)) return kNothing;
-  return std::max(least_seconds(run),
-                  run.seconds * std::max(0.0, wanted * wanted - before * before) / gained);
+  return std::max({kFewest, least_seconds(run),
+                   run.seconds * std::max(0.0, wanted * wanted - before * before) / gained});
 }
 
 /// Fewer seconds are better; among equals more sigma, up to twice what is wanted.

@@ -10,6 +10,7 @@ namespace isac::explain {
 namespace {
 
 constexpr double kTaut = 5;              // N that keep a muscle and its sensor taut
+constexpr double kMoving = 0.05;         // rad/s
 constexpr double kPlannedOfLimit = 0.9;  // a planned motion stays this far inside
 
 /// rad either way of rest that leave both muscles taut and both force sensors within their range, between two mean pressures; a tenth is
@@ -22,8 +23,8 @@ double bearable_amplitude(const RigRange& range, const RigFacts& rig, double low
   return kShare * 2 * rig.wheel_radius * spare / range.stiffness;
 }
 
-/// How the mean force of the muscles follows the mean pressure: as recorded where that varied, else as the model says of Δp, which is one
-/// muscle's pressure against the other's (B/2 for each).
+/// How the mean force of the muscles follows the mean pressure: as recorded where that varied and both muscles pulled, else as the model
+/// says of Δp, which is one muscle's pressure against the other's (B/2 for each). A slack muscle's force does not follow.
 void find_forces(const Predictor& predictor, const ModelPoint& model, RigRange& range) {
   constexpr double kVaried = 0.1 * kPascalPerKgfCm2;  // Pa, a standard deviation
   double n = 0, p = 0, f = 0, pp = 0, pf = 0;
@@ -33,6 +34,7 @@ void find_forces(const Predictor& predictor, const ModelPoint& model, RigRange& 
       const double pressure = 0.5 * (run.raw_pressure[0][k] + run.raw_pressure[1][k]),
                    force = 0.5 * (run.force[0][k] + run.force[1][k]);
       if (!std::isfinite(pressure) || !std::isfinite(force)) continue;
+      if (std::min(run.force[0][k], run.force[1][k]) < range.least_force) continue;
       n += 1;
       p += pressure;
       f += force;
@@ -70,7 +72,9 @@ RigRange range_of(const Predictor& predictor, const ModelPoint& model,
     if (run.force[0].empty() || !run.has_pressure) continue;
     for (std::size_t k = 0; k < run.time.size(); ++k) {
       force = std::max({force, run.force[0][k], run.force[1][k]});
-      range.least_force = std::min({range.least_force, run.force[0][k], run.force[1][k]});
+      // A vented muscle in a clamped run says nothing of a slack one that is led.
+      if (std::abs(run.velocity[k]) > kMoving)
+        range.least_force = std::min({range.least_force, run.force[0][k], run.force[1][k]});
     }
   }
   for (const Row& row : data.rows) {

@@ -183,9 +183,10 @@ bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run
 
 void add_rows(Prepared& data, const RigRange& range) {
   const PreparedRun& run = data.runs.front();
+  const double slowest = run.experiment == "constant-pressure" ? told_speed(data.rig.angle_step) : 0.0;
   const auto put = [&](Chain chain, double from, std::size_t step) {
     for (std::size_t k = 0; k < run.time.size(); k += step)
-      if (run.time[k] >= from)
+      if (run.time[k] >= from && (chain != Chain::kTorque || std::abs(run.velocity[k]) >= slowest))
         data.rows.push_back({.run = 0, .sample = static_cast<unsigned>(k), .block = 0, .chain = chain});
   };
   const auto stride = static_cast<std::size_t>(data.stride);

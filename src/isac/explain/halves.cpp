@@ -182,10 +182,9 @@ std::vector<Halves> halves_of(const Around& place, std::size_t effect, int threa
   return halves;
 }
 
-bool differs_by_half(const Halves& halves) noexcept {
-  constexpr double kForSure = 4.0;    // sigma
-  constexpr double kOwnError = 0.01;  // of the effect: a name's own equation is right to less
-  return halves.sigma >= kForSure && halves.share >= kOwnError;
+bool differs_by_half(const Halves& halves, double own_error) noexcept {
+  constexpr double kForSure = 4.0;  // sigma
+  return halves.sigma >= kForSure && halves.share >= own_error;
 }
 
 }  // namespace isac::explain

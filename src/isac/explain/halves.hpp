@@ -30,7 +30,7 @@ struct Halves {
 /// By each thing that may differ, the surest first. `place`: around the fit that names it; `effect`: index in its model's effects.
 [[nodiscard]] std::vector<Halves> halves_of(const Around& place, std::size_t effect, int threads = 1);
 
-/// By more than a right name's own error?
-[[nodiscard]] bool differs_by_half(const Halves& halves) noexcept;
+/// By more than a right name's own error, as a share of what it does? Its own equation is right to less than a hundredth.
+[[nodiscard]] bool differs_by_half(const Halves& halves, double own_error = 0.01) noexcept;
 
 }  // namespace isac::explain

@@ -283,6 +283,10 @@ bool Prepared::has(Chain chain) const noexcept {
   return std::any_of(rows.begin(), rows.end(), [&](const Row& row) { return row.chain == chain; });
 }
 
+double told_speed(double angle_step) noexcept {
+  return std::isfinite(angle_step) ? kBeside * kFewSteps * angle_step / (2 * kTellWindow) : 0.0;
+}
+
 double Prepared::untold() const noexcept {
   double seconds = 0;
   for (const PreparedRun& run : runs) seconds += run.untold;

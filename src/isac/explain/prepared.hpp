@@ -119,6 +119,9 @@ class HeldOut {
   std::vector<series::Recording> runs_;
 };
 
+/// rad/s, below which a hand that leads the joint may leave its direction untold; 0 where the encoder's step is not known.
+[[nodiscard]] double told_speed(double angle_step) noexcept;
+
 /// The day's clock begins with the first of `runs`, or at `first_start` if that is earlier.
 [[nodiscard]] Prepared prepare(std::span<const series::Recording> runs, const RigFacts& rig,
                                const BaselineModel& baseline, double block_seconds,

@@ -108,12 +108,20 @@ bool Ranking::are_two_causes_of_one(const Trial& general, const Trial& simple) c
                  .separation < kTwinLimit;
 }
 
-/// A friction that goes with the mean pressure is at one pressure what one is that does not: no general case of it, but another, which a run at another
-/// pressure tells.
-bool Ranking::is_another_at_this_pressure(const Trial& general, const Trial& simple) const {
+bool goes_with_pressure(const Hypothesis& friction, const Values& values) {
   constexpr double kGoesWithIt = 0.5;  // the power
-  return id_of(general) == "pressure_dependent_friction" && id_of(simple) == "coulomb_friction" &&
-         general.values[1] > kGoesWithIt &&
+  return std::string_view(friction.info().id) == "pressure_dependent_friction" && values[1] > kGoesWithIt;
+}
+
+bool Ranking::are_two_frictions(const Trial& by_pressure, const Trial& plain) const {
+  return goes_with_pressure(library_.hypotheses[static_cast<std::size_t>(by_pressure.hypothesis)],
+                            by_pressure.values) &&
+         id_of(plain) == "coulomb_friction";
+}
+
+/// At one pressure they are the same; a run at another pressure tells.
+bool Ranking::is_another_at_this_pressure(const Trial& general, const Trial& simple) const {
+  return are_two_frictions(general, simple) &&
          compare(data_, simple.residual, general.residual, 0, noise_density(data_, simple.residual))
                  .separation < kTwinLimit;
 }
@@ -137,7 +145,9 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     for (std::size_t i = 1; i < trials.size(); ++i) {
       const double apart = trials[i].behind.separation,
                    closed = (before.squaredNorm() - trials[0].loss) / trials[i].behind.unit,
-                   hardly_any = is_dry(trials[i]) ? kHardlyAny * closed : 0;
+                   hardly_any = is_dry(trials[i]) && !are_two_frictions(trials[0], trials[i])
+                                    ? kHardlyAny * closed
+                                    : 0;
       const bool twins = apart < kTwinLimit;
       const bool simpler =
           nests(id_of(trials[0]), id_of(trials[i])) &&

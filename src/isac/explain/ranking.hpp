@@ -28,6 +28,9 @@ inline constexpr double kFirst = 2;
 /// there are 0.028 and more from their simple cases, seed 9311, by the oracle), and no rival without a name takes a name away by it.
 inline constexpr double kHardlyAny = 0.005;
 
+/// Dry friction in a power of the mean pressure that is not near none: no general case of one that does not go with it, but another.
+[[nodiscard]] bool goes_with_pressure(const Hypothesis& friction, const Values& values);
+
 /// A candidate that was refitted beside what was there already.
 struct Trial {
   int hypothesis = -1;
@@ -65,6 +68,7 @@ class Ranking {
   [[nodiscard]] bool is_against_its_name(const Trial& trial) const;
   [[nodiscard]] bool is_likelier_cause(const Trial& trial, const Trial& than) const;
   [[nodiscard]] bool are_two_causes_of_one(const Trial& general, const Trial& simple) const;
+  [[nodiscard]] bool are_two_frictions(const Trial& by_pressure, const Trial& plain) const;
   [[nodiscard]] bool is_another_at_this_pressure(const Trial& general, const Trial& simple) const;
   /// Best first; those that cannot be ruled out are marked; general cases of a simpler one in the set are dropped.
   /// `before`: the residual that all of them started from.

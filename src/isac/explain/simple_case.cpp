@@ -53,8 +53,10 @@ void Search::hold_against_its_simple_case() {
                 noise_density(data_, found_.model.residual));
     const double closed =
         (found_.baseline.residual.squaredNorm() - found_.model.residual.squaredNorm()) / behind.unit;
-    const bool alike = behind.separation < kTwinLimit ||
-                       (general.dry && behind.separation * behind.separation < kHardlyAny * closed);
+    const bool hardly_more = general.dry &&
+                             !goes_with_pressure(general, found_.model.model.effects[at].values) &&
+                             behind.separation * behind.separation < kHardlyAny * closed;
+    const bool alike = behind.separation < kTwinLimit || hardly_more;
     say(fmt::format("{}: its simple case is {:.1f} sigma behind ({:.1f} sigma of data between them)",
                     general.id(), told_behind(behind), behind.separation));
     if (!alike && behind.t >= kLeadsBy) continue;
