@@ -247,9 +247,9 @@ double seconds_needed(double before, double after, double wanted, const PlannedR
                    run.seconds * std::max(0.0, wanted * wanted - before * before) / gained});
 }
 
-/// Fewer seconds are better; among equals more sigma, up to twice what is wanted.
+/// Fewer seconds are better; among equals more sigma.
 double score_of(double before, double after, double wanted, const PlannedRun& run) {
-  return -seconds_needed(before, after, wanted, run) + 1e-2 * std::min(after, 2 * wanted);
+  return -seconds_needed(before, after, wanted, run) + 0.1 * std::log1p(after);
 }
 
 /// Every number of the run that its experiment uses, moved up and down by `step`.

@@ -5,6 +5,7 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/predict_parts.hpp"
 
 namespace isac::explain {
 namespace {
@@ -181,6 +182,21 @@ bool pull(const RigRange& range, Torque& torque, double radius, PreparedRun& run
   return largest <= range.force_limit && least >= range.least_force;
 }
 
+/// The encoder as the model has it: a reading that drifts counts on while the bar is clamped.
+void read_angle(const ModelPoint& model, PreparedRun& run) {
+  for (const Active& a : model.effects) {
+    const models::EffectInfo& info = a.hypothesis->info();
+    if (info.hook != models::Hook::kReading || info.state_count > 0) continue;
+    for (std::size_t k = 0; k < run.time.size(); ++k) {
+      models::Readings<double> read;
+      read.angle = run.angle[k];
+      models::effect_reading(a.hypothesis->effect, a.values.data(), time_of(*a.hypothesis, run, k),
+                             static_cast<const double*>(nullptr), read);
+      run.angle[k] = read.angle;
+    }
+  }
+}
+
 void add_rows(Prepared& data, const RigRange& range) {
   const PreparedRun& run = data.runs.front();
   const double slowest = run.experiment == "constant-pressure" ? told_speed(data.rig.angle_step) : 0.0;
@@ -235,8 +251,11 @@ series::PlanRun plan_run(const PlannedRun& run) {
 std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint& model,
                                      const RigRange& range, const PlannedRun& planned) {
   const Prepared& before = recorded.data();
-  const double speed = planned.experiment == "constant-pressure" ? planned.peak_speed_rad_s : 0.0;
-  if (!(speed <= range.speed)) return std::nullopt;
+  constexpr double kTellsWell = 1.5;  // of the speed at which a hand's direction may be untold
+  if (planned.experiment == "constant-pressure" &&
+      !(planned.peak_speed_rad_s <= range.speed &&
+        planned.peak_speed_rad_s >= kTellsWell * told_speed(before.rig.angle_step)))
+    return std::nullopt;
   series::Program program;
   try {
     program = series::plan_programs({.runs = {plan_run(planned)}}, range.limits, 1).front();
@@ -287,6 +306,7 @@ std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint
         n, planned.experiment == "pcu-step" || !std::isfinite(planned.middle_rad) ? 0.0 : planned.middle_rad);
   }
   if (range.mean_force > 0 && !pull(range, torque, before.rig.wheel_radius, run)) return std::nullopt;
+  read_angle(model, run);
   run.raw_angle = run.angle;
   if (const double step = before.rig.angle_step; std::isfinite(step) && step > 0)
     for (double& angle : run.raw_angle) angle = step * std::round(angle / step);
