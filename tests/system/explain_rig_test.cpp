@@ -136,5 +136,33 @@ TEST_F(ExplainOnTheRig, tells_two_effects_apart_after_the_one_sweep_that_it_asks
   EXPECT_TRUE(holds(ids(after["rejected"]), "torque_offset"));
 }
 
+// Half a step of the encoder is a third of what tells them apart, and pulls against it.
+TEST_F(ExplainOnTheRig, tells_two_effects_apart_though_half_a_step_of_the_encoder_is_like_one_of_them) {
+  const std::string effect = ",effect=muscle_asymmetry:-2.5e-6";
+  log_first_afternoon("seed=1" + effect);
+  const std::vector<std::string> tied = told_by(explain());
+  EXPECT_TRUE(holds(tied, "muscle_asymmetry"));
+  EXPECT_TRUE(holds(tied, "torque_offset"));
+  log("seed=101" + effect, {"--plan", folder_ / "next.toml"});
+  const json after = explain();
+  ASSERT_EQ(ids(after["effects"]), std::vector<std::string>{"muscle_asymmetry"}) << after["summary"];
+  EXPECT_TRUE(after["alternatives"].empty()) << after["summary"];
+}
+
+// A vented muscle in the valves' own sweep is no leave to lead a slack one, and friction with the pressure is another, not hardly more.
+TEST_F(ExplainOnTheRig, tells_friction_with_the_pressure_after_all_sweeps) {
+  const std::string effect = ",effect=pressure_dependent_friction:0.02:1";
+  log("seed=11" + effect, {"all"});
+  const std::vector<std::string> tied = told_by(explain());
+  EXPECT_TRUE(holds(tied, "coulomb_friction"));
+  EXPECT_TRUE(holds(tied, "pressure_dependent_friction"));
+  log("seed=111" + effect, {"--plan", folder_ / "next.toml"});
+  const json after = explain();
+  EXPECT_EQ(after["verdict"], "named") << after["summary"];
+  ASSERT_EQ(ids(after["effects"]), std::vector<std::string>{"pressure_dependent_friction"});
+  EXPECT_TRUE(holds(ids(after["rejected"]), "coulomb_friction"));
+  EXPECT_NEAR(after["effects"][0]["parameters"]["n"]["value"].get<double>(), 1, 0.2);
+}
+
 }  // namespace
 }  // namespace isac::test

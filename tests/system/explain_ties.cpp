@@ -1,13 +1,20 @@
 // explain_ties: hides one effect after another in the simulated rig, records the first afternoon of the tutorial, and where the
 // answer leaves a tie, records what it asks for and asks again. Prints one row of a Markdown table per dataset.
-//   explain_ties [seeds per effect, default 2]
+//   explain_ties [seeds per effect, default 2] [random]
+// With `random` each tie is also recorded with runs drawn from those that could be asked for, until it is settled as well.
 // With `sweeps` for the seeds: records all sweeps of a rig with each of these and other effects, three of them held out, and asks once.
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
+#include "isac/core/units.hpp"
+#include "isac/explain/experiment_runs.hpp"
+#include "isac/record/plan_file.hpp"
 #include "run_program.hpp"
 
 namespace {
@@ -119,48 +126,122 @@ int ask_of_all_sweeps() {
   return 0;
 }
 
+struct Tie {
+  std::string hidden, truth;
+  std::vector<std::string> left;
+  std::string one, other;  ///< what the plan is to tell apart
+};
+
+/// What the first afternoon leaves tied; nothing if the truth stands alone or is not among it, or if no run is asked for.
+std::optional<Tie> tie_in(const std::string& hidden, const std::string& dataset, const std::string& plan,
+                          std::vector<std::string>& left) {
+  const json answer = ask(dataset, plan);
+  if (answer.is_discarded() || !answer.contains("effects")) return std::nullopt;
+  left = names(answer);
+  const std::string truth = hidden.substr(7, hidden.find(':') - 7);
+  if (!holds(left, truth) || left.size() < 2 || !std::filesystem::exists(plan)) return std::nullopt;
+  const json& pair = answer.at("separation").at("between");
+  return Tie{hidden, truth, left, pair[0], pair[1]};
+}
+
+/// What a run was to rule out is gone, and the truth is there, first but for what no run tells from it.
+bool is_settled(const Tie& tie, const std::vector<std::string>& then) {
+  const bool first_goes = tie.other == tie.truth || (tie.one != tie.truth && !holds(then, tie.one));
+  return holds(then, tie.truth) && !holds(then, first_goes ? tie.one : tie.other) &&
+         (then.front() == tie.truth || holds(tie.left, then.front()));
+}
+
+double seconds_of(const std::string& plan) {
+  double seconds = 0;
+  for (const auto& run : isac::record::read_plan(plan).runs) seconds += run.duration;
+  return seconds;
+}
+
+/// The simulated testbed, as its first recordings show it.
+std::vector<isac::explain::PlannedRun> possible_runs() {
+  using namespace isac::explain;
+  constexpr double kPressure = 3 * isac::kPascalPerKgfCm2;
+  RigRange range;
+  range.angle = 0.4;
+  range.speed = 3;
+  range.mean_force = 95;
+  range.mean_pressure = kPressure;
+  range.force_slope = 0.5 * 174.2 / isac::kPascalPerKgfCm2;
+  range.stiffness = 23450 * 0.019 * 0.019;
+  range.least_force = 5;
+  range.moves_freely = range.valves = true;
+  RigFacts rig;
+  rig.wheel_radius = 0.019;
+  rig.initial_pressure = kPressure;
+  return candidate_runs(range, rig);
+}
+
+/// Seconds of runs drawn at random until the tie is settled; kGivenUp if it is not by then.
+double random_seconds(const Tie& tie, const std::string& dataset, const std::string& plan, int seed) {
+  constexpr double kGivenUp = 600, kEach = 40;
+  const std::vector<isac::explain::PlannedRun> all = possible_runs();
+  std::mt19937 random(static_cast<unsigned>(seed));
+  double seconds = 0;
+  for (int draw = 0; seconds < kGivenUp && draw < 60; ++draw) {
+    isac::explain::PlannedRun run = all[random() % all.size()];
+    run.seconds = std::max(kEach, isac::explain::least_seconds(run));
+    isac::record::write_plan(plan, {.runs = {isac::explain::plan_run(run)}});
+    // What the rig refuses costs nothing here, what is to be repeated is left out.
+    std::vector<std::filesystem::path> before, after;
+    for (const auto& file : std::filesystem::directory_iterator(dataset)) before.push_back(file.path());
+    if (!record(plan, "sim:seed=" + std::to_string(1000 * seed + draw) + "," + tie.hidden, dataset)) {
+      for (const auto& file : std::filesystem::directory_iterator(dataset)) after.push_back(file.path());
+      for (const auto& path : after)
+        if (std::find(before.begin(), before.end(), path) == before.end()) std::filesystem::remove(path);
+      continue;
+    }
+    seconds += run.seconds;
+    if (is_settled(tie, names(ask(dataset, plan + ".none")))) return seconds;
+  }
+  return kGivenUp;
+}
+
 }  // namespace
 
 int main(int count, char** words) {
   if (count > 1 && std::string(words[1]) == "sweeps") return ask_of_all_sweeps();
   const int seeds = count > 1 ? std::atoi(words[1]) : 2;
+  const bool at_random = count > 2 && std::string(words[2]) == "random";
   const std::string first =
       std::string(ISAC_SOURCE_DIR) + "/docs/tutorials/tell-two-effects-apart/first.toml";
   int tied = 0, settled = 0;
-  std::printf("| hidden | seed | left before | left after | seconds |\n| --- | --- | --- | --- | --- |\n");
+  double ours = 0, random = 0;
+  std::printf("| hidden | seed | left before | left after | seconds | at random |\n");
+  std::printf("| --- | --- | --- | --- | --- | --- |\n");
   for (int seed = 1; seed <= seeds; ++seed)
     for (const std::string hidden : kHidden) {
       const isac::test::ScratchFolder folder;
-      const std::string dataset = folder / "dataset", plan = folder / "next.toml";
-      const std::string truth = hidden.substr(7, hidden.find(':') - 7);
+      const std::string dataset = folder / "dataset", other = folder / "other", plan = folder / "next.toml";
       if (!record(first, "sim:seed=" + std::to_string(seed) + "," + hidden, dataset)) continue;
-      const json before = ask(dataset, plan);
-      if (before.is_discarded() || !before.contains("effects")) continue;
-      const std::vector<std::string> left = names(before);
-      if (!holds(left, truth) || left.size() < 2 || !std::filesystem::exists(plan)) {
-        std::printf("| %s | %d | %s | not tied | |\n", hidden.c_str() + 7, seed, joined(left).c_str());
+      std::vector<std::string> left;
+      const std::optional<Tie> tie = tie_in(hidden, dataset, plan, left);
+      if (!tie) {
+        std::printf("| %s | %d | %s | not tied | | |\n", hidden.c_str() + 7, seed, joined(left).c_str());
         std::fflush(stdout);
         continue;
       }
-      const json& pair = before.at("separation").at("between");
-      double seconds = 0;
-      const std::string text = isac::test::read_text(plan);
-      for (std::size_t at = text.find("duration = \""); at != std::string::npos;
-           at = text.find("duration = \"", at + 1))
-        seconds += std::stod(text.substr(at + 12));
+      if (at_random) std::filesystem::copy(dataset, other, std::filesystem::copy_options::recursive);
+      const double seconds = seconds_of(plan);
       if (!record(plan, "sim:seed=" + std::to_string(100 + seed) + "," + hidden, dataset)) continue;
       const std::vector<std::string> then = names(ask(dataset, folder / "none.toml"));
-      // Settled: what the run was to rule out is gone, and the truth is there, first but for what no run tells from it.
-      const std::string one = pair[0], other = pair[1];
-      const std::string rival = one == truth ? other : other == truth || !holds(then, one) ? one : other;
-      const bool done =
-          holds(then, truth) && !holds(then, rival) && (then.front() == truth || holds(left, then.front()));
+      const bool done = is_settled(*tie, then);
+      const double drawn = at_random ? random_seconds(*tie, other, folder / "random.toml", seed) : 0;
       ++tied;
       settled += done ? 1 : 0;
-      std::printf("| %s | %d | %s | %s%s | %.0f |\n", hidden.c_str() + 7, seed, joined(left).c_str(),
-                  joined(then).c_str(), done ? "" : " (not settled)", seconds);
+      ours += seconds;
+      random += drawn;
+      std::printf("| %s | %d | %s | %s%s | %.0f | %s |\n", hidden.c_str() + 7, seed, joined(left).c_str(),
+                  joined(then).c_str(), done ? "" : " (not settled)", seconds,
+                  at_random ? std::to_string(static_cast<int>(drawn)).c_str() : "");
       std::fflush(stdout);
     }
-  std::printf("\n%d ties, %d settled\n", tied, settled);
+  std::printf("\n%d ties, %d settled, in %.0f s", tied, settled, ours);
+  if (at_random) std::printf("; runs drawn at random: %.0f s, none beyond 600 s counted", random);
+  std::printf("\n");
   return 0;
 }

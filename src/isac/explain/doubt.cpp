@@ -221,7 +221,8 @@ void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions
     const std::vector<Halves> halves = halves_of(place, found.model.tolerances + i, options.threads);
     if (halves.empty()) continue;
     // (Beside slow turns, whose remains are no second effect, a dry friction is not the same in both halves by so little either.)
-    const bool blurred = found.blurred && found.model.model.effects[found.model.tolerances + i].hypothesis->dry;
+    const bool blurred =
+        found.blurred && found.model.model.effects[found.model.tolerances + i].hypothesis->dry;
     const auto other = std::find_if(halves.begin(), halves.end(), [&](const Halves& h) {
       return blurred ? differs_by_half(h, std::sqrt(kHardlyAny)) : differs_by_half(h);
     });

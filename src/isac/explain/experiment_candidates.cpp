@@ -112,6 +112,8 @@ std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& ri
   const auto add = [&](PlannedRun run) {
     constexpr double kLeast = 0.02;  // rad: an encoder sees little of less
     if (run.amplitude_rad < kLeast) return;
+    if (run.experiment == "constant-pressure")
+      run.peak_speed_rad_s = std::min(run.peak_speed_rad_s, 0.9 * fastest_by_hand(run.amplitude_rad));
     run.seconds = std::max(run.seconds, std::min(kLong, least_seconds(run)));
     runs.push_back(run);
   };

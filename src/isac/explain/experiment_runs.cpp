@@ -224,6 +224,11 @@ double base_value(const Predictor& predictor, const ModelPoint& model, const cha
   return otherwise;
 }
 
+double fastest_by_hand(double amplitude) noexcept {
+  constexpr double kShortestStroke = 0.15;  // s, from one end to the other
+  return kPi * amplitude / kShortestStroke;
+}
+
 double least_seconds(const PlannedRun& run) {
   double period = 0;
   if (run.pressure_swing_kgcm2 > 0 && run.waveform != "hold") period = run.pressure_period_s;
@@ -253,7 +258,7 @@ std::optional<Prepared> would_record(const Predictor& recorded, const ModelPoint
   const Prepared& before = recorded.data();
   constexpr double kTellsWell = 1.5;  // of the speed at which a hand's direction may be untold
   if (planned.experiment == "constant-pressure" &&
-      !(planned.peak_speed_rad_s <= range.speed &&
+      !(planned.peak_speed_rad_s <= std::min(range.speed, fastest_by_hand(planned.amplitude_rad)) &&
         planned.peak_speed_rad_s >= kTellsWell * told_speed(before.rig.angle_step)))
     return std::nullopt;
   series::Program program;

@@ -59,6 +59,9 @@ struct RigRange {
 /// About 150 of them, of all kinds, in a fixed order.
 [[nodiscard]] std::vector<PlannedRun> candidate_runs(const RigRange& range, const RigFacts& rig);
 
+/// rad/s, peak, of an arm that leads the bar to and fro.
+[[nodiscard]] double fastest_by_hand(double amplitude) noexcept;
+
 /// At least one period of what swings or sweeps, and ten seconds.
 [[nodiscard]] double least_seconds(const PlannedRun& run);
 
