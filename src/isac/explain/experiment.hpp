@@ -11,7 +11,7 @@
 /// refitted, b true and a refitted) and the smaller one is taken; of two models of which one is a special case of the other
 /// the general one is taken as true, since it mimics the special one always.
 /// Of about 150 possible runs (experiment_runs.hpp) the one with the largest smallest separation is taken, improved by a
-/// search over its numbers, and cut or stretched to the seconds it needs; a second and a third are added if one is not enough. Where no
+/// search over its numbers, and stretched to the seconds it needs, 40 at least; a second and a third are added if one is not enough. Where no
 /// run reaches `least`, the answer is what to change at the rig.
 ///
 /// Units: sigma; plans as PlannedRun says. Threads: uses `threads`; the result does not depend on their number. Errors: none.

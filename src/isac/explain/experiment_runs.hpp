@@ -34,7 +34,7 @@ struct RigRange {
   double stiffness = 0;      ///< N m/rad, −A r² of the model; 0 where there is none
   double force_limit = 200;  ///< N
   double least_force =
-      0;  ///< N, below which no muscle is let: it hangs slack, unless the recordings went there too
+      0;  ///< N, below which no muscle is let: it hangs slack, unless a moving joint was recorded there
   bool moves_freely = false;   ///< the inertia is known, so that a free joint says something
   bool free_torque = false;    ///< rows of the torque are taken from free runs too
   bool valves = false;         ///< commands are recorded: the valve unit is in the model
