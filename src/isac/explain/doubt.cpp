@@ -220,12 +220,8 @@ void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions
   for (std::size_t i = 0; i < found.added.size(); ++i) {
     const std::vector<Halves> halves = halves_of(place, found.model.tolerances + i, options.threads);
     if (halves.empty()) continue;
-    // (Beside slow turns, whose remains are no second effect, a dry friction is not the same in both halves by so little either.)
-    const bool blurred =
-        found.blurred && found.model.model.effects[found.model.tolerances + i].hypothesis->dry;
-    const auto other = std::find_if(halves.begin(), halves.end(), [&](const Halves& h) {
-      return blurred ? differs_by_half(h, std::sqrt(kHardlyAny)) : differs_by_half(h);
-    });
+    const auto other =
+        std::find_if(halves.begin(), halves.end(), [](const Halves& h) { return differs_by_half(h); });
     if (other == halves.end()) {
       const Halves& most = halves.front();
       e.effects[i].evidence.push_back(
@@ -238,8 +234,13 @@ void doubt_what_differs_by_half(const Predictor& predictor, const ExplainOptions
     std::string differs = fmt::format("{} is not the same {}: by {:.2g} % of it, {:.1f} sigma.",
                                       found.added.size() == 1 ? "It" : e.effects[i].id, other->where,
                                       100 * other->share, other->sigma);
-    // Another machine's friction is seldom of the catalogue's form.
-    if (!predictor.data().baseline.terms.empty()) {
+    // Another machine's friction is seldom of the catalogue's form; and beside slow turns, whose remains are no second effect, no dry one is the same
+    // in both halves to better than they leave it.
+    const bool blurred =
+        found.blurred && found.model.model.effects[found.model.tolerances + i].hypothesis->dry &&
+        std::none_of(halves.begin(), halves.end(),
+                     [](const Halves& h) { return differs_by_half(h, std::sqrt(kHardlyAny)); });
+    if (!predictor.data().baseline.terms.empty() || blurred) {
       e.effects[i].evidence.push_back({false, std::move(differs)});
       continue;
     }
