@@ -218,7 +218,21 @@ INSTANTIATE_TEST_SUITE_P(
              "unknown, for functions without a name were ahead by half a hundredth of it"},
         Miss{"faint", "coloured", "asymmetric_hysteresis", "9310",
              R"("alternatives":[{"id":"asymmetric_hysteresis")",
-             "a hysteresis, beside which the difference by direction was not needed"}));
+             "a hysteresis, beside which the difference by direction was not needed"},
+        Miss{"faint", "white", "quadratic_damping", "9312", R"("effects":[{"id":"quadratic_damping")",
+             "too small to matter, 0.07 of the noise of one sample, though p was 1e-6"},
+        Miss{"faint", "real", "creep", "9312", R"("effects":[{"id":"creep")",
+             "too small to matter, 0.06 of the noise of one sample, though p was 0.0002"},
+        Miss{"faint", "real", "periodic_disturbance", "9312", R"("effects":[{"id":"periodic_disturbance")",
+             "nothing, for the phases of four runs of ten were alike by chance"},
+        Miss{"faint", "coloured", "valve_deadband", "9312", R"("effects":[{"id":"valve_deadband")",
+             "unknown, for slow noise hid at which pressure the runs began"},
+        Miss{"faint", "coloured", "valve_hysteresis", "9312", R"("effects":[{"id":"valve_hysteresis")",
+             "unknown, for a slip in the torque spoke for what blocks saw in a pressure"},
+        Miss{"faint", "quantised", "gravity_imbalance", "9312", R"("effects":[{"id":"gravity_imbalance")",
+             "unknown, for functions had taken a share of the zero out of torque and motion, each another"},
+        Miss{"faint", "quantised", "encoder_slip", "9312", R"("effects":[{"id":"encoder_slip")",
+             "nothing, for the same reason"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "isac/estimate/linear_algebra.hpp"
+#include "isac/explain/gate.hpp"
 #include "tied_data.hpp"
 
 namespace isac::explain {
@@ -334,6 +335,26 @@ TEST(Judge, measures_a_large_rare_effect_by_what_its_refit_leaves_elsewhere) {
   // The yardstick is that hypothesis' alone.
   judge(screen, setting.data, setting.library, {.flips = 99}, {.hypothesis = 1, .functions = functions(1)});
   EXPECT_GT(screen.rare_p, 0.05);
+}
+
+// Half of what is material is asked for only where it is beyond doubt that something is there.
+TEST(Gate, leaves_no_doubt_fifty_times_below_the_level) {
+  const Prepared data;
+  const Library library;
+  const Gatekeeper gate(data, library, 0.01, 0.1);
+  Screen screen;
+  screen.limit = 4;
+  const auto doubtless = [&](double flips, double rare, double max_T) {
+    screen.p_value = flips;
+    screen.rare_p = rare;
+    screen.max_T = max_T;
+    return gate.judge(screen, {}, {}, false, {}).beyond_doubt;
+  };
+  EXPECT_FALSE(doubtless(0.0005, 1, 4.2)) << "the least p of 1999 flips, and T hardly beyond its limit";
+  EXPECT_TRUE(doubtless(0.0005, 1, 4.9));  // 4.9² − 4² = 8.0 > 2 ln 50 = 7.8
+  EXPECT_FALSE(doubtless(0.4, 0.0004, 3));
+  EXPECT_TRUE(doubtless(0.4, 0.00005, 3));
+  EXPECT_FALSE(doubtless(0.4, 1, 3));
 }
 
 TEST(JointP, of_two_tests_is_small_no_more_often_than_it_says) {

@@ -105,6 +105,32 @@ TEST(SpectralLines, phases_by_chance_seldom_pass_for_one_clock_and_one_clock_is_
   EXPECT_GE(told, 285);
 }
 
+// Ten runs of a day. In six of them the motion has a line there, so they say nothing about it; the phases of the other four lie within 100 degrees by
+// chance. A common phase takes something out of those four and adds more to the others.
+TEST(SpectralLines, phases_of_few_runs_that_agree_are_held_against_those_of_all) {
+  std::mt19937 random(8);
+  std::vector<Series> runs = noise_runs(random, Noise::kWhite, 10, 4096);
+  const std::vector<double> phase = {0.0, 0.6, 1.2, 1.8, 4.0, 4.6, 3.4, 5.2, 4.2, 3.8};
+  for (std::size_t r = 4; r < runs.size(); ++r) {
+    std::vector<double> angle;
+    for (std::size_t k = 0; k < runs[r].value.size(); ++k)
+      angle.push_back(std::sin(kTurn * 3.7 * 0.002 * static_cast<double>(k)));
+    runs[r].drivers.push_back(std::move(angle));
+  }
+  add_line(runs, 3.7, 0.5, phase);
+  const std::vector<SpectralLine> lines = spectral_lines(runs, 0.001);
+  ASSERT_FALSE(lines.empty());
+  EXPECT_EQ(lines[0].runs, 4U);
+  EXPECT_FALSE(lines[0].repeats);
+  EXPECT_NEAR(lines[0].amplitude, 0.5, 0.06);
+  // Alike in all of them they are one clock's.
+  runs = noise_runs(random, Noise::kWhite, 10, 4096);
+  add_line(runs, 3.7, 0.5, std::vector<double>(10, 0.6));
+  const std::vector<SpectralLine> alike = spectral_lines(runs, 0.001);
+  ASSERT_FALSE(alike.empty());
+  EXPECT_TRUE(alike[0].repeats);
+}
+
 // What a strong line leaks into the bins beside its own says as much as any: the cap makes them alike.
 TEST(SpectralLines, finds_a_strong_line_where_it_is_and_not_a_bin_beside_it) {
   std::mt19937 random(6);

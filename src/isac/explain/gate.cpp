@@ -7,6 +7,8 @@
 namespace isac::explain {
 namespace {
 
+constexpr double kFarBelow = 50;  // times below the level a p-value leaves no doubt
+
 /// Of each chain: what turns √Σ x², x in units of σ, into noise floors; 0 where the chain has no rows.
 std::array<double, kChains> floors_per_root_sum(const Prepared& data, const Weights& weights,
                                                 const Floors& floors) {
@@ -31,6 +33,8 @@ Gate Gatekeeper::judge(const Screen& s, const Weights& weights, const Floors& fl
   Gate gate;
   gate.p_value = joint_p(s.p_value, s.rare_p, significance_);
   gate.significant = gate.p_value <= significance_;
+  gate.beyond_doubt = gate.significant && (gate.p_value <= significance_ / kFarBelow ||
+                                           s.max_T * s.max_T >= s.limit * s.limit + 2 * std::log(kFarBelow));
   const std::array<double, kChains> scale = floors_per_root_sum(data_, weights, floors);
   const auto consider = [&](double amplitude2, const double* norm2, const std::string& what, bool dense) {
     for (std::size_t c = 0; c < kChains; ++c) {

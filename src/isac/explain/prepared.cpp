@@ -75,7 +75,7 @@ const std::vector<double>* values_of(const series::Recording& run, const char* n
 /// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is far more than the readings' scatter: slow noise begins anywhere.
 double first_pressure(const std::vector<double>& pressure, const std::vector<double>& command,
                       double interval) {
-  constexpr double kLongest = 2.0, kShortest = 0.3, kLag = 0.17;  // s
+  constexpr double kLongest = 20.0, kShortest = 0.3, kLag = 0.17;  // s
   constexpr double kFarMore = 5;
   std::size_t n = 0;
   while (n < pressure.size() && static_cast<double>(n) * interval < kLongest && command[n] == command[0]) ++n;

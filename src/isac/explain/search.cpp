@@ -186,7 +186,7 @@ void Search::forward() {
     bool take = open && !step.trials.empty() && static_cast<int>(found_.added.size()) < options_.most_effects;
     if (take) {
       const double size = step.trials.front().material;
-      take = size >= options_.material;
+      take = size >= least_material(step);
       if (take && !found_.added.empty())
         take = is_clear_enough(whole_size(step.trials.front()), chains_of(step.trials.front())) ||
                closes_all_that_is_left(step);

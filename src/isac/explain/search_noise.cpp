@@ -17,7 +17,7 @@ constexpr std::size_t kColours = 6;  // effects beside which the noise's colour 
 }  // namespace
 
 void Search::take_colour(const Eigen::VectorXd& left_over) {
-  take_colours(data_, beside_functions(left_over), found_.weights);
+  take_colours(data_, left_over, cleaned(), found_.weights);
   if (!look_.settled.empty()) {  // the pressures' own has been read off already
     for (const Chain c : {Chain::kPressure1, Chain::kPressure2})
       found_.weights.colour[static_cast<int>(c)] = look_.weights.colour[static_cast<int>(c)];
@@ -37,7 +37,7 @@ bool Search::no_zero_wanders_beside_it() {
     return false;
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
   Weights weights = found_.weights;
-  take_colours(data_, beside_functions(rows), weights);
+  take_colours(data_, rows, cleaned(), weights);
   if (a_zero_wanders(weights)) return false;
   say("beside it the force sensors' zero does not wander: once more with one that stands still");
   begin_anew_with_noise_of(rows);
@@ -75,7 +75,7 @@ bool Search::a_wandering_zero_was_hidden_by(const Step& step) {
   if (colour_beside_best_ || step.trials.empty() || a_zero_wanders(found_.weights)) return false;
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, step.trials.front().residual);
   Weights weights = found_.weights;
-  take_colours(data_, beside_functions(rows), weights);
+  take_colours(data_, rows, cleaned(), weights);
   if (!a_zero_wanders(weights)) return false;
   say((found_.added.empty() ? "" : ranking_.id_of(found_.steps.back().trials.front()) + " and ") +
       ranking_.id_of(step.trials.front()) +
@@ -112,7 +112,7 @@ Eigen::VectorXd Search::least_noise_beside(const Screen& s) const {
   share_work(options_.threads, trials.size(), [&](std::size_t i) {
     rows[i] = unfiltered(data_, found_.weights, trials[i].residual);
     Weights weights = found_.weights;
-    take_colours(data_, beside_functions(rows[i]), weights);
+    take_colours(data_, rows[i], cleaned(), weights);
     likelihood[i] = log_likelihood(data_, weights, rows[i]);
   });
   return rows[static_cast<std::size_t>(std::max_element(likelihood.begin(), likelihood.end()) -

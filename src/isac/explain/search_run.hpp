@@ -121,6 +121,9 @@ class Search {
   void move_to(const Fit& fit);
   /// Rows without what functions of the measured signals make of them: where the noise's colour is read off.
   Eigen::VectorXd beside_functions(const Eigen::VectorXd& rows) const;
+  Cleaned cleaned() const {
+    return [this](const Eigen::VectorXd& rows) { return beside_functions(rows); };
+  }
   static bool a_zero_wanders(const Weights& weights) {
     return weights.colour[static_cast<int>(Chain::kTorque)].wander > 0;
   }
@@ -174,11 +177,15 @@ class Search {
   Step refitted(Step step);
   /// What closes next to nothing is not what shows so much: the best that closes enough stands first, where nothing rules it out.
   void put_material_first(Step& step) const;
+  /// Noise floors that a finding must be as large as: half as many where a first effect is there beyond doubt (gate.hpp) and closes five sigma.
+  double least_material(const Step& step) const;
   /// What blocks agree on may still be no more than the noise's own model makes of the best of so many, where that noise is slow. (A first
   /// effect is given the benefit of three sigma: that noise is a model.)
   void leave_to_slow_noise(Step& step);
   /// What functions without a name close, by the noise's own model: an effect that no name is like is no noise for that.
   double units_of_functions(const Step& step) const;
+  /// Does the best trial enter the rows where most shows, or is it significant by itself? Else what it closes, by chance, is nothing of that.
+  bool speaks_of_what_shows(const Step& step) const;
   bool is_implausible(const Trial& t);
   /// A response at a finite size that no size of the effect keeps: it was the curvature of noise.
   bool is_empty_promise(const Trial& t, const Screen& s) const;

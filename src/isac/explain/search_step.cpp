@@ -282,11 +282,17 @@ Step Search::refitted(Step step) {
   if (found_.added.empty()) put_material_first(step);
   // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
   const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
-  step.gate.material = std::max(step.gate.dense_size, refitted) >= options_.material;
-  step.units =
-      std::max(step.trials.empty() ? 0.0 : units_closed(step.trials.front()), units_of_functions(step));
+  step.gate.material = std::max(step.gate.dense_size, refitted) >= least_material(step);
+  step.units = std::max(speaks_of_what_shows(step) ? units_closed(step.trials.front()) : 0.0,
+                        units_of_functions(step));
   leave_to_slow_noise(step);
   return step;
+}
+
+double Search::least_material(const Step& step) const {
+  const bool for_sure = found_.added.empty() && step.gate.beyond_doubt && !step.trials.empty() &&
+                        units_closed(step.trials.front()) >= kLargeForSure;
+  return for_sure ? kWorthALook * options_.material : options_.material;
 }
 
 void Search::put_material_first(Step& step) const {
@@ -310,12 +316,13 @@ void Search::leave_to_slow_noise(Step& step) {
   if (found_.added.empty() ? step.units >= kThreeSigma : best_of_many <= options_.significance) return;
   step.gate.significant = false;
   step.gate.p_value = std::max(step.gate.p_value, best_of_many);
-  const std::string id = ranking_.id_of(step.trials.front());
+  const bool named = speaks_of_what_shows(step);
+  const std::string what = named ? ranking_.id_of(step.trials.front()) : step.gate.what;
   const std::string sentence =
       fmt::format("ruled out: {:.1f} sigma, no more than noise as slow as this makes of the best of so many",
-                  std::sqrt(std::max(0.0, units_closed(step.trials.front()))));
-  found_.notes.push_back({id, sentence});
-  say(id + ": " + sentence);
+                  std::sqrt(std::max(0.0, step.units)));
+  if (named) found_.notes.push_back({what, sentence});
+  say(what + ": " + sentence);
 }
 
 double Search::units_of_functions(const Step& step) const {
@@ -324,6 +331,15 @@ double Search::units_of_functions(const Step& step) const {
   const double unit =
       compare(data_, generic.residual, place_.residual, 0, noise_density(data_, generic.residual)).unit;
   return generic.gain / unit - 2.0 * kChoosingOne * static_cast<double>(generic.functions.size());
+}
+
+bool Search::speaks_of_what_shows(const Step& step) const {
+  if (step.trials.empty()) return false;
+  const Trial& best = step.trials.front();
+  if ((together_with(chains_of(best)) & together_with(bit(step.gate.chain))) != 0) return true;
+  return std::any_of(step.screen.candidates.begin(), step.screen.candidates.end(), [&](const Screened& c) {
+    return c.hypothesis == best.hypothesis && is_significant(c, step.screen);
+  });
 }
 
 bool Search::is_implausible(const Trial& t) {

@@ -176,6 +176,18 @@ double refined(std::span<const Series> runs, const std::vector<std::size_t>& whi
   return 0.5 * (low + high);
 }
 
+/// Does the common phase take something out of all runs together, those that say nothing about the line (for it may be their motion's) among them?
+/// Of four runs phases are alike by chance in one of twenty cases.
+bool shrinks_together(std::span<const Series> runs, const SpectralLine& line) {
+  double taken = 0;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const double own = line.run_sine[r] * line.sine + line.run_cosine[r] * line.cosine,
+                 all = line.sine * line.sine + line.cosine * line.cosine;
+    taken += static_cast<double>(runs[r].value.size()) * (2 * own - all);
+  }
+  return taken > 0;
+}
+
 void measure(std::span<const Series> runs, const std::vector<Spectrum>& spectra,
              const std::vector<std::size_t>& which, SpectralLine& line) {
   line.run_sine.assign(runs.size(), 0.0);
@@ -201,9 +213,10 @@ void measure(std::span<const Series> runs, const std::vector<Spectrum>& spectra,
   const double count = static_cast<double>(which.size());
   const double noise = 2 * error2,  // of all `squares`
       differ = squares - (sine * sine + cosine * cosine) / count;
-  line.repeats = count < 1.5 || differ < noise + kIncoherent * std::max(0.0, squares - noise);
   line.sine = sine / count;
   line.cosine = cosine / count;
+  line.repeats = (count < 1.5 || differ < noise + kIncoherent * std::max(0.0, squares - noise)) &&
+                 shrinks_together(runs, line);
   // The square of an amplitude that noise made is taken off.
   line.amplitude = line.repeats ? std::hypot(line.sine, line.cosine)
                                 : std::sqrt(std::max(0.0, (squares - 2 * error2) / count));

@@ -8,7 +8,8 @@
 /// floor). `cap` keeps one run from speaking for all; in at least half of the runs that can show it the line must stand out.
 /// Runs whose motion, command or pressure has a line there as well, or a harmonic of their period, say nothing about it.
 /// Of the bins within four, which a strong line's leakage makes alike under the cap, the one that explains most is refined by least squares
-/// over all runs; the phase is that of the run's clock if it repeats: Σ_r |a_r − ā|² below the noise's part and a quarter of the rest.
+/// over all runs; the phase is that of the run's clock if it repeats: Σ_r |a_r − ā|² below the noise's part and a quarter of the rest, and
+/// Σ_r n_r (2 a_r·ā − |ā|²) > 0 over all runs, n_r samples.
 /// Units: SI (N m, Pa, Hz). Threads: pure. Errors: none; too short runs are left out.
 /// Source: Fisher 1929; Rayleigh 1880 for the phases; Thomson 1982 for the local F; docs/derivations/explain.md.
 #pragma once

@@ -377,16 +377,19 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   return best;
 }
 
-void take_colours(const Prepared& data, const Eigen::VectorXd& residual, Weights& weights) {
+void take_colours(const Prepared& data, const Eigen::VectorXd& residual, const Cleaned& cleaned,
+                  Weights& weights) {
   constexpr int kTorque = static_cast<int>(Chain::kTorque), kMotion = static_cast<int>(Chain::kMotion);
+  const Eigen::VectorXd noise = cleaned(residual);
   for (int c = 0; c < kChains; ++c)
-    if (data.has(static_cast<Chain>(c))) weights.colour[c] = colour_of(data, residual, static_cast<Chain>(c));
+    if (data.has(static_cast<Chain>(c))) weights.colour[c] = colour_of(data, noise, static_cast<Chain>(c));
   // The same force sensors read the torque and what the motion is held against.
   const double wander = weights.colour[kTorque].wander;
   const bool both = wander > 0 && data.has(Chain::kMotion);
   weights.one_zero = both && data.with_free_torque;
   if (weights.one_zero) {
-    weights.colour[kMotion] = colour_of(data, without_shared_zero(data, weights, residual), Chain::kMotion);
+    weights.colour[kMotion] =
+        colour_of(data, cleaned(without_shared_zero(data, weights, residual)), Chain::kMotion);
   } else if (both) {
     const double ratio = weights.sigma[kTorque] / weights.sigma[kMotion];
     weights.colour[kMotion].wander = std::max(weights.colour[kMotion].wander, ratio * ratio * wander);

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 
 #include "isac/explain/prepared.hpp"
@@ -61,8 +62,13 @@ void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::Matri
 /// reach, the white part from what is left within it.
 [[nodiscard]] Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain);
 
-/// Colours of all chains from a residual r/σ, and whether torque and motion have one zero: `weights` with them, ready (take() is called).
-void take_colours(const Prepared& data, const Eigen::VectorXd& residual, Weights& weights);
+/// Takes what an effect may have left out of rows r/σ, chain by chain.
+using Cleaned = std::function<Eigen::VectorXd(const Eigen::VectorXd& rows)>;
+
+/// Colours of all chains from what a model leaves, r/σ, `cleaned`, and whether torque and motion have one zero: `weights` with them, ready (take() is
+/// called). That zero is taken off the motion before it is cleaned, for each chain by itself loses another share of it.
+void take_colours(const Prepared& data, const Eigen::VectorXd& residual, const Cleaned& cleaned,
+                  Weights& weights);
 
 /// Logarithm of the likelihood of a residual r/σ under these colours, but for a constant: −½ Σ (v²/(P + w) + ln(P + w)).
 [[nodiscard]] double log_likelihood(const Prepared& data, const Weights& weights,
