@@ -232,7 +232,9 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"faint", "quantised", "gravity_imbalance", "9312", R"("effects":[{"id":"gravity_imbalance")",
              "unknown, for functions had taken a share of the zero out of torque and motion, each another"},
         Miss{"faint", "quantised", "encoder_slip", "9312", R"("effects":[{"id":"encoder_slip")",
-             "nothing, for the same reason"}));
+             "nothing, for the same reason"},
+        Miss{"clear", "white", "encoder_gain", "9314", R"("effects":[{"id":"inertia_error")",
+             "a compliance of 36 Hz, a thousandth of what it closes ahead of the inertia that it is then"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

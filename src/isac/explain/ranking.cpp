@@ -145,7 +145,8 @@ void Ranking::rank(std::vector<Trial>& trials, const Eigen::VectorXd& before) co
     for (std::size_t i = 1; i < trials.size(); ++i) {
       const double apart = trials[i].behind.separation,
                    closed = (before.squaredNorm() - trials[0].loss) / trials[i].behind.unit,
-                   hardly_any = is_dry(trials[i]) && !are_two_frictions(trials[0], trials[i])
+                   hardly_any = id_of(trials[i]) == "inertia_error" ||
+                                        (is_dry(trials[i]) && !are_two_frictions(trials[0], trials[i]))
                                     ? kHardlyAny * closed
                                     : 0;
       const bool twins = apart < kTwinLimit;
