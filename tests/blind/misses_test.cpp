@@ -234,7 +234,12 @@ INSTANTIATE_TEST_SUITE_P(
         Miss{"faint", "quantised", "encoder_slip", "9312", R"("effects":[{"id":"encoder_slip")",
              "nothing, for the same reason"},
         Miss{"clear", "white", "encoder_gain", "9314", R"("effects":[{"id":"inertia_error")",
-             "a compliance of 36 Hz, a thousandth of what it closes ahead of the inertia that it is then"}));
+             "a compliance of 36 Hz, a thousandth of what it closes ahead of the inertia that it is then"},
+        Miss{"clear", "real", "encoder_drift", "9314", R"("effects":[{"id":"encoder_drift")",
+             "a slip, for the drift made the forces' zero seem to wander"},
+        Miss{"clear", "quantised", "periodic_disturbance", "9314",
+             R"("effects":[{"id":"periodic_disturbance")",
+             "zeros of the forces beside it, which closed three units"}));
 
 struct PairMiss {
   const char *noise, *effects, *seed;  ///< the label's

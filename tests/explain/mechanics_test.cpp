@@ -361,6 +361,33 @@ TEST(Ranking, keeps_a_gain_beside_an_offset_that_fits_as_well) {
   EXPECT_FALSE(trials[1].in_set);
 }
 
+// A compliance of many hertz is an inertia. Four sigma of it are no other thing where both close a hundred sigma and more; where they close thirty they are.
+TEST(Ranking, a_compliance_is_farther_from_an_inertia_than_any_equation_from_the_truth) {
+  const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::free_in_steps(20, 1.7, 0.6)});
+  const Ranking ranking(bench.data, bench.library);
+  const Eigen::VectorXd left = 0.5 * bench.stem.residual;
+  Eigen::VectorXd off =
+      left;  // across what is left: a change that makes of noise no more noise than its own square
+  for (Eigen::Index i = 0; i < off.size(); i += 2) off[i] = -off[i];
+  off -= left * (left.dot(off) / left.squaredNorm());
+  const Comparison apart = compare(bench.data, left, left + off, 0, noise_density(bench.data, left));
+  const auto first = [&](double closed) {  // in sigma
+    std::vector<Trial> trials(2);
+    trials[0].hypothesis =
+        static_cast<int>(bench.find("series_elasticity") - bench.library.hypotheses.data());
+    trials[0].values = {0.004, 13, 0.08};
+    trials[0].residual = left;
+    trials[1].hypothesis = static_cast<int>(bench.find("inertia_error") - bench.library.hypotheses.data());
+    trials[1].values = {5e-4};
+    trials[1].residual = left + 8 / apart.separation * off;
+    for (Trial& t : trials) t.loss = t.residual.squaredNorm();
+    ranking.rank(trials, left + closed / apart.separation * off);
+    return ranking.id_of(trials.front());
+  };
+  EXPECT_EQ(first(30), "series_elasticity");
+  EXPECT_EQ(first(150), "inertia_error");
+}
+
 TEST(Ranking, knows_no_rival_of_another_reading) {
   const Bench bench(TiedRig{}, {by_hand(20, 0.35, 1.0), test::clamped(20, 0.1, 1.2, 5)});
   const Ranking ranking(bench.data, bench.library);

@@ -162,7 +162,7 @@ void Search::forward() {
     if (found_.blurred)
       say(fmt::format("It is {:.1g} of what was found: where the joint turns slowly nobody can tell.",
                       units_closed(step.trials.front()) / largest_units_));
-    if (!open && (no_zero_wanders_beside_it() || slow_noise_hid_another(step))) {
+    if (no_zero_wanders_beside_it() || (!open && slow_noise_hid_another(step))) {
       if (found_.wants_torque_of_free_runs) return;
       continue;
     }

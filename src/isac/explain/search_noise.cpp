@@ -32,14 +32,14 @@ void Search::take_colour(const Eigen::VectorXd& left_over) {
 }
 
 bool Search::no_zero_wanders_beside_it() {
-  if (found_.added.empty() || colour_beside_best_ || !look_.settled.empty() ||
-      !a_zero_wanders(found_.weights))
+  if (found_.added.empty() || zero_was_stopped_ || !look_.settled.empty() || !a_zero_wanders(found_.weights))
     return false;
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
   Weights weights = found_.weights;
   take_colours(data_, rows, cleaned(), weights);
   if (a_zero_wanders(weights)) return false;
   say("beside it the force sensors' zero does not wander: once more with one that stands still");
+  zero_was_stopped_ = true;
   begin_anew_with_noise_of(rows);
   return true;
 }

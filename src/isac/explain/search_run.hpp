@@ -271,6 +271,7 @@ class Search {
   bool left_elsewhere_ = false;  ///< and told so
   double untold_half_step_ = 0;  ///< rad: of the encoder, which no run tells
   bool a_rival_was_tried_ = false, a_pair_was_tried_ = false;
+  bool zero_was_stopped_ = false;    ///< the search began anew with a zero that stands still
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };
 

@@ -280,8 +280,11 @@ Step Search::refitted(Step step) {
     fit_with_the_baseline(step.trials, kFewSigma);
   choose_moment(step);
   if (found_.added.empty()) put_material_first(step);
-  // What shows in a few blocks only is as large as its refit says, not as its linear response promised.
-  const double refitted = step.trials.empty() ? 0.0 : step.trials.front().material;
+  // What shows in a few blocks only is as large as its refit says, not as its linear response promised; and two zeros that go against each other, which
+  // close next to nothing, may be of any size.
+  const bool closes_some =
+      !step.trials.empty() && (!found_.added.empty() || units_closed(step.trials.front()) >= kThreeSigma);
+  const double refitted = closes_some ? step.trials.front().material : 0.0;
   step.gate.material = std::max(step.gate.dense_size, refitted) >= least_material(step);
   step.units = std::max(speaks_of_what_shows(step) ? units_closed(step.trials.front()) : 0.0,
                         units_of_functions(step));
@@ -300,7 +303,7 @@ void Search::put_material_first(Step& step) const {
   if (trials.empty() || trials.front().material >= options_.material || step.gate.size < options_.material)
     return;
   const auto first = std::find_if(trials.begin(), trials.end(), [&](const Trial& t) {
-    return t.in_set && t.material >= options_.material;
+    return t.in_set && t.material >= options_.material && units_closed(t) >= kThreeSigma;
   });
   if (first == trials.end()) return;
   std::rotate(trials.begin(), first, first + 1);
