@@ -180,6 +180,14 @@ void leave_unnamed(const Predictor& predictor, const Found& found, Explanation& 
   if (e.unknown && found.comes_and_goes) add_time(*e.unknown);
 }
 
+/// Is what was found first less than what is material, and there only because it is beyond doubt? Something larger may show elsewhere.
+bool is_little(const Found& found, const ExplainOptions& options) {
+  if (found.steps.empty()) return false;
+  const Step& first = found.steps.front();
+  return first.gate.dense_size < options.material &&
+         (first.trials.empty() || first.trials.front().material < options.material);
+}
+
 }  // namespace
 
 Explanation explain(std::span<const series::Recording> runs, const HeldOut& heldout,
@@ -192,7 +200,8 @@ Explanation explain(std::span<const series::Recording> runs, const HeldOut& held
   Look first;
   first.provisional = true;
   Found found = search(*predictor_here, *library_here, data, options, first);
-  const bool nothing = found.added.empty() && !(found.gate.significant && found.gate.material);
+  const bool nothing =
+      (found.added.empty() && !(found.gate.significant && found.gate.material)) || is_little(found, options);
   const bool unseen = !found.wants_torque_of_free_runs && nothing && can_add_torque_of_free_runs(data) &&
                       free_torque_is_off(*predictor_here, found.model.model);
   if (found.wants_torque_of_free_runs || unseen) {
