@@ -105,8 +105,8 @@ TEST(FirstPressure, is_told_by_as_long_as_the_command_stands_still) {
     const double off = data.runs.front().first_pressure[0] - rig.p0;
     squares += off * off / kRuns;
   }
-  // 20 s of it: 0.003 √(2 · 0.3/20) = 0.00052 kg/cm2.
-  EXPECT_LT(std::sqrt(squares), 0.0007 * kPascalPerKgfCm2);
+  // 20 s of it: 0.003 √(2 · 0.3/20) = 0.00052 kg/cm2; of one run in sixty the first two look unlike the others by chance.
+  EXPECT_LT(std::sqrt(squares), 0.0009 * kPascalPerKgfCm2);
 }
 
 }  // namespace

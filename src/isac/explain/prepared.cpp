@@ -72,14 +72,30 @@ const std::vector<double>* values_of(const series::Recording& run, const char* n
 }
 
 /// Pressure at the start of a run. A valve that does not answer small errors keeps it for good, so the noise of one reading will not do:
-/// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is far more than the readings' scatter: slow noise begins anywhere.
+/// p = c₀ + c₁ e^(−t/T) while the command stands still, c₁ only where it is far more than the readings' scatter: slow noise begins anywhere. Up to 20 s
+/// are read where the first two are like the others, by the scatter of means of two; else those two, for a leak moves it within the dead band.
 double first_pressure(const std::vector<double>& pressure, const std::vector<double>& command,
                       double interval) {
-  constexpr double kLongest = 20.0, kShortest = 0.3, kLag = 0.17;  // s
-  constexpr double kFarMore = 5;
+  constexpr double kLongest = 20.0, kFirst = 2.0, kShortest = 0.3, kLag = 0.17;  // s
+  constexpr double kFarMore = 5, kUnlike = 3;                                    // deviations
   std::size_t n = 0;
   while (n < pressure.size() && static_cast<double>(n) * interval < kLongest && command[n] == command[0]) ++n;
   if (static_cast<double>(n) * interval < kShortest) return pressure.front();
+  const auto first = static_cast<std::size_t>(kFirst / interval);
+  if (n < 4 * first) n = std::min(n, first);
+  if (n > first) {
+    std::vector<double> mean;
+    for (std::size_t k = 0; k + first <= n; k += first) {
+      double sum = 0;
+      for (std::size_t j = k; j < k + first; ++j) sum += pressure[j] - pressure[0];
+      mean.push_back(sum / static_cast<double>(first));
+    }
+    double all = 0, squares = 0;
+    const double others = static_cast<double>(mean.size() - 1);
+    for (std::size_t b = 1; b < mean.size(); ++b) all += mean[b] / others;
+    for (std::size_t b = 1; b < mean.size(); ++b) squares += (mean[b] - all) * (mean[b] - all);
+    if (std::abs(mean[0] - all) > kUnlike * std::sqrt(squares / (others - 1))) n = first;
+  }
   double s1 = 0, sg = 0, sgg = 0, sp = 0, sgp = 0, spp = 0;
   for (std::size_t k = 0; k < n; ++k) {
     const double g = std::exp(-(static_cast<double>(k) * interval) / kLag), p = pressure[k] - pressure[0];

@@ -41,9 +41,10 @@ Found Search::run() {
   take_first_colour();
   if (!found_.wants_torque_of_free_runs) forward();
   if (found_.adequate && found_.added.empty() && !found_.steps.empty()) doubt_the_clock();
+  const bool little = take_what_is_little();
   if (found_.wants_torque_of_free_runs || found_.worth_another_look) return std::move(found_);
-  if (found_.added.size() > 1) swap_and_drop();
-  if (found_.adequate && !found_.added.empty()) hold_against_others();
+  if (!little && found_.added.size() > 1) swap_and_drop();
+  if (!little && found_.adequate && !found_.added.empty()) hold_against_others();
   look_at_remainder();
   look_at_moments_beside();
   if (found_.adequate) leave_half_a_step(false);
@@ -55,6 +56,26 @@ Found Search::run() {
   look_at_limits();
   add_slow_part(noise_of_what_is_left(), found_.floors);
   return std::move(found_);
+}
+
+bool Search::take_what_is_little() {
+  if (!found_.adequate || !found_.added.empty() || found_.steps.empty() || found_.wants_torque_of_free_runs ||
+      !is_beyond_doubt(found_.steps.back()))
+    return false;
+  const Found nothing = found_;
+  little_counts_ = true;
+  found_.steps.clear();
+  forward();
+  if (found_.wants_torque_of_free_runs || found_.worth_another_look) return true;
+  if (found_.added.size() > 1) swap_and_drop();
+  if (found_.adequate && !found_.added.empty()) hold_against_others();
+  if (found_.adequate && !found_.added.empty()) return true;
+  say("What is too small to matter has no name that stands: it is left.");
+  found_ = nothing;
+  little_counts_ = false;
+  found_.baseline = fit_baseline(predictor_, library_.tolerances, found_.weights);
+  move_to(found_.baseline);
+  return false;
 }
 
 void Search::hold_against_others() {

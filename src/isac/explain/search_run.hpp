@@ -62,6 +62,8 @@ class Search {
   std::vector<Step> settled_steps() const;
   /// Goes on after the steps that an earlier look settled.
   void take_settled();
+  /// Where nothing material was found, something smaller that is there beyond doubt is looked for once more; it stays only with a name that stands.
+  bool take_what_is_little();
   bool is_open(const Step& step) const;
   /// Beside a wrong share of the first, a second effect shows little until both are refitted.
   bool is_worth_a_second_name(const Step& step) const;
@@ -177,8 +179,10 @@ class Search {
   Step refitted(Step step);
   /// What closes next to nothing is not what shows so much: the best that closes enough stands first, where nothing rules it out.
   void put_material_first(Step& step) const;
-  /// Noise floors that a finding must be as large as: half as many where a first effect is there beyond doubt (gate.hpp) and closes five sigma.
+  /// Noise floors that a finding must be as large as: half as many where a first effect is there beyond doubt (gate.hpp) and closes five sigma, once
+  /// nothing larger was found.
   double least_material(const Step& step) const;
+  bool is_beyond_doubt(const Step& step) const;
   /// What blocks agree on may still be no more than the noise's own model makes of the best of so many, where that noise is slow. (A first
   /// effect is given the benefit of three sigma: that noise is a model.)
   void leave_to_slow_noise(Step& step);
@@ -271,6 +275,7 @@ class Search {
   bool left_elsewhere_ = false;  ///< and told so
   double untold_half_step_ = 0;  ///< rad: of the encoder, which no run tells
   bool a_rival_was_tried_ = false, a_pair_was_tried_ = false;
+  bool little_counts_ = false;       ///< half of what is material is enough, beyond doubt
   bool zero_was_stopped_ = false;    ///< the search began anew with a zero that stands still
   bool colour_beside_best_ = false;  ///< the noise's colour was read off once more, beside the best candidate
 };

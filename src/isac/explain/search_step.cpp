@@ -293,9 +293,12 @@ Step Search::refitted(Step step) {
 }
 
 double Search::least_material(const Step& step) const {
-  const bool for_sure = found_.added.empty() && step.gate.beyond_doubt && !step.trials.empty() &&
-                        units_closed(step.trials.front()) >= kLargeForSure;
-  return for_sure ? kWorthALook * options_.material : options_.material;
+  return little_counts_ && is_beyond_doubt(step) ? kWorthALook * options_.material : options_.material;
+}
+
+bool Search::is_beyond_doubt(const Step& step) const {
+  return found_.added.empty() && step.gate.beyond_doubt && !step.trials.empty() &&
+         units_closed(step.trials.front()) >= kLargeForSure;
 }
 
 void Search::put_material_first(Step& step) const {
