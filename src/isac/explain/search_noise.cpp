@@ -32,7 +32,8 @@ void Search::take_colour(const Eigen::VectorXd& left_over) {
 }
 
 bool Search::no_zero_wanders_beside_it() {
-  if (found_.added.empty() || zero_was_stopped_ || !look_.settled.empty() || !a_zero_wanders(found_.weights))
+  if (found_.added.empty() || zero_was_stopped_ || !found_.hid_the_zero.empty() || look_.colour_beside_best ||
+      !look_.settled.empty() || !a_zero_wanders(found_.weights))
     return false;
   const Eigen::VectorXd rows = unfiltered(data_, found_.weights, found_.model.residual);
   Weights weights = found_.weights;
