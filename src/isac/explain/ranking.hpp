@@ -25,7 +25,8 @@ inline constexpr double kSurest = 0.99;
 inline constexpr double kFirst = 2;
 /// Of what a name closes, in squares of sigma: no equation is truer than that. So little beyond a dry friction makes no general case of it (the
 /// encoder tells roughly when a slow motion turns: a friction that falls from rest, 0.0011 from Coulomb's, was Coulomb's; general effects that are
-/// there are 0.028 and more from their simple cases, seed 9311, by the oracle), and no rival without a name takes a name away by it.
+/// there are 0.028 and more from their simple cases, seed 9311, by the oracle), nor a compliance of an added inertia (0.0013 of one that was none; half of
+/// what one closes that is there), and no rival without a name takes a name away by it.
 inline constexpr double kHardlyAny = 0.005;
 
 /// Dry friction in a power of the mean pressure that is not near none: no general case of one that does not go with it, but another.
