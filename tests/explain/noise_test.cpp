@@ -136,7 +136,7 @@ TEST(Colour, is_gone_from_what_the_filter_leaves_and_comes_back_without_it) {
 /// Torque and motion of the same runs, read by sensors of one zero: y = n + d, y' = n' + 2 d (a σ half as large).
 struct OneZero {
   Prepared data;
-  Eigen::VectorXd rows;
+  Eigen::VectorXd rows, zero;  ///< the zero's part of the rows; none in those of the torque, which tell it
   Weights weights;
 
   explicit OneZero(unsigned seed, unsigned per_run = 2000) {
@@ -147,6 +147,7 @@ struct OneZero {
     for (PreparedRun& run : data.runs)
       for (unsigned k = 0; k < 4 * (per_run + 4); ++k) run.time.push_back(run.interval * k);
     rows.resize(2 * d.size());
+    zero = Eigen::VectorXd::Zero(rows.size());
     data.run_begin = {0};
     for (unsigned r = 0; r < 5; ++r) {
       for (const Chain chain : {Chain::kTorque, Chain::kMotion})
@@ -154,6 +155,7 @@ struct OneZero {
           const auto of = static_cast<Eigen::Index>(r * per_run + k);
           rows[static_cast<Eigen::Index>(data.rows.size())] =
               d[of] + (chain == Chain::kTorque ? n[of] : m[of]);
+          if (chain == Chain::kMotion) zero[static_cast<Eigen::Index>(data.rows.size())] = d[of];
           data.rows.push_back(torque.rows[static_cast<std::size_t>(of)]);
           data.rows.back().chain = chain;
         }
@@ -243,6 +245,63 @@ TEST(OneZero, is_taken_off_the_motion_before_functions_take_their_share) {
   ASSERT_GE(wandering, 6);
   EXPECT_LT(slow / wandering, 1.0);  // 9/4 is the zero's, in this chain's σ²
   EXPECT_GT(slow_after, 3 * slow) << slow_after << " " << slow;
+}
+
+// What is taken off the motion is not the zero but what the torque's noisy rows tell of it: a run's mean of that error against the derivation.
+TEST(OneZero, is_told_by_the_torque_with_the_error_that_the_derivation_has) {
+  constexpr std::size_t kRows = 2000;
+  double measured = 0, runs = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const OneZero day(10 * seed, kRows);
+    Eigen::VectorXd rows = day.rows, zero = day.zero;
+    for (std::size_t i = 0; i < day.data.rows.size(); ++i) {
+      const double sigma = day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+      rows[static_cast<Eigen::Index>(i)] /= sigma;
+      zero[static_cast<Eigen::Index>(i)] /= sigma;
+    }
+    const Eigen::VectorXd error = without_shared_zero(day.data, day.weights, rows) - rows + zero;
+    for (std::size_t i = 0; i < day.data.rows.size(); i += kRows)
+      if (day.data.rows[i].chain == Chain::kMotion) {
+        const double mean = error.segment(static_cast<Eigen::Index>(i), kRows).mean();
+        measured += mean * mean;
+        ++runs;
+      }
+  }
+  const SlowError told = error_of_zero({.white = 1, .slow = 0, .memory = 0, .wander = 9}, kStep);
+  const double share = 0.5;
+  EXPECT_NEAR(share * share * 2 * told.variance * told.memory / (kRows * kStep) / (measured / runs), 1.0,
+              0.25);
+}
+
+// That error is slow, and functions of the signals take it out of the rows that a colour is read off: here the means of quarters of a second.
+TEST(OneZero, leaves_the_motion_at_least_the_error_with_which_the_torque_tells_it) {
+  constexpr Eigen::Index kTogether = 30;
+  int wandering = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    OneZero day(10 * seed, 6000);
+    day.data.with_free_torque = true;
+    Eigen::VectorXd rows = day.rows;
+    for (std::size_t i = 0; i < day.data.rows.size(); ++i)
+      rows[static_cast<Eigen::Index>(i)] /= day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+    const Cleaned of_the_motion = [&](const Eigen::VectorXd& left) {
+      Eigen::VectorXd out = left;
+      for (Eigen::Index i = 0; i + kTogether <= left.size(); i += kTogether)
+        if (day.data.rows[static_cast<std::size_t>(i)].chain == Chain::kMotion)
+          out.segment(i, kTogether).array() -= left.segment(i, kTogether).mean();
+      return out;
+    };
+    Weights weights = day.weights;
+    take_colours(day.data, rows, of_the_motion, weights);
+    if (!weights.one_zero) continue;
+    ++wandering;
+    const Colour& motion = weights.colour[static_cast<int>(Chain::kMotion)];
+    const SlowError told = error_of_zero(weights.colour[static_cast<int>(Chain::kTorque)], kStep);
+    EXPECT_GE(motion.slow * motion.memory, 0.25 * told.variance * told.memory * (1 - 1e-12));
+    const Colour read =
+        colour_of(day.data, of_the_motion(without_shared_zero(day.data, weights, rows)), Chain::kMotion);
+    EXPECT_LT(read.slow * read.memory, 0.5 * motion.slow * motion.memory);  // it would not be read off
+  }
+  ASSERT_GE(wandering, 3);
 }
 
 TEST(Colour, makes_of_a_jump_what_it_is_worth_beside_noise_that_cannot_jump) {

@@ -377,6 +377,44 @@ Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain ch
   return best;
 }
 
+namespace {
+
+/// s between the rows of a chain's runs, where nothing lies between; 0 without two rows.
+double rows_apart(const Prepared& data, Chain chain) {
+  double apart = 0;
+  for (std::size_t i = 1; i < data.rows.size(); ++i) {
+    const Row &before = data.rows[i - 1], &row = data.rows[i];
+    if (row.chain != chain || before.chain != chain || row.run != before.run || row.sample <= before.sample)
+      continue;
+    const double here = (row.sample - before.sample) * data.runs[row.run].interval;
+    if (apart == 0 || here < apart) apart = here;
+  }
+  return apart;
+}
+
+/// The zero that is taken off the motion is not the zero, but what the torque's rows tell of it: noise as slow as the filter forgets. Functions of the
+/// signals take most of it out of the rows that a colour is read off, so it is the least that a colour may be.
+void admit_error_of_zero(const Prepared& data, Weights& weights) {
+  const double apart = rows_apart(data, Chain::kTorque);
+  if (!(apart > 0)) return;
+  const SlowError error = error_of_zero(weights.colour[static_cast<int>(Chain::kTorque)], apart);
+  const double share =
+      weights.sigma[static_cast<int>(Chain::kTorque)] / weights.sigma[static_cast<int>(Chain::kMotion)];
+  Colour& motion = weights.colour[static_cast<int>(Chain::kMotion)];
+  if (motion.slow * motion.memory >= share * share * error.variance * error.memory) return;
+  motion.slow = share * share * error.variance;
+  motion.memory = error.memory;
+}
+
+}  // namespace
+
+SlowError error_of_zero(const Colour& colour, double apart) {
+  const double moves = colour.wander * (1 - std::exp(-2 * apart / kWanders)),
+               noise = colour.white + 2 * colour.slow * colour.memory / apart,
+               variance = 0.5 * (moves + std::sqrt(moves * moves + 4 * moves * noise));
+  return {variance, apart * (variance + noise) / variance};
+}
+
 void take_colours(const Prepared& data, const Eigen::VectorXd& residual, const Cleaned& cleaned,
                   Weights& weights) {
   constexpr int kTorque = static_cast<int>(Chain::kTorque), kMotion = static_cast<int>(Chain::kMotion);
@@ -390,6 +428,7 @@ void take_colours(const Prepared& data, const Eigen::VectorXd& residual, const C
   if (weights.one_zero) {
     weights.colour[kMotion] =
         colour_of(data, cleaned(without_shared_zero(data, weights, residual)), Chain::kMotion);
+    admit_error_of_zero(data, weights);
   } else if (both) {
     const double ratio = weights.sigma[kTorque] / weights.sigma[kMotion];
     weights.colour[kMotion].wander = std::max(weights.colour[kMotion].wander, ratio * ratio * wander);
