@@ -6,6 +6,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
+#include "isac/explain/colours.hpp"
 #include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/weights.hpp"
 #include "tied_data.hpp"
@@ -166,13 +167,18 @@ struct OneZero {
     weights.one_zero = true;
     weights.take(data);
   }
+
+  /// Rows in their chains' σ.
+  [[nodiscard]] Eigen::VectorXd over_sigma(Eigen::VectorXd of) const {
+    for (std::size_t i = 0; i < data.rows.size(); ++i)
+      of[static_cast<Eigen::Index>(i)] /= weights.sigma[static_cast<int>(data.rows[i].chain)];
+    return of;
+  }
 };
 
 TEST(OneZero, of_torque_and_motion_is_taken_off_the_motion_and_comes_back) {
   const OneZero day(5);
-  Eigen::VectorXd plain = day.rows;
-  for (std::size_t i = 0; i < day.data.rows.size(); ++i)
-    plain[static_cast<Eigen::Index>(i)] /= day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+  const Eigen::VectorXd plain = day.over_sigma(day.rows);
   Eigen::VectorXd rows = day.rows;
   weigh(day.data, day.weights, rows);
   double before = 0, after = 0, count = 0;
@@ -218,9 +224,7 @@ TEST(OneZero, is_taken_off_the_motion_before_functions_take_their_share) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     OneZero day(10 * seed, 6000);
     day.data.with_free_torque = true;
-    Eigen::VectorXd rows = day.rows;
-    for (std::size_t i = 0; i < day.data.rows.size(); ++i)
-      rows[static_cast<Eigen::Index>(i)] /= day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+    const Eigen::VectorXd rows = day.over_sigma(day.rows);
     const Cleaned means_of_the_torque = [&](const Eigen::VectorXd& left) {
       Eigen::VectorXd out = left;
       std::vector<double> mean(5, 0.0), n(5, 0.0);
@@ -253,12 +257,7 @@ TEST(OneZero, is_told_by_the_torque_with_the_error_that_the_derivation_has) {
   double measured = 0, runs = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const OneZero day(10 * seed, kRows);
-    Eigen::VectorXd rows = day.rows, zero = day.zero;
-    for (std::size_t i = 0; i < day.data.rows.size(); ++i) {
-      const double sigma = day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
-      rows[static_cast<Eigen::Index>(i)] /= sigma;
-      zero[static_cast<Eigen::Index>(i)] /= sigma;
-    }
+    const Eigen::VectorXd rows = day.over_sigma(day.rows), zero = day.over_sigma(day.zero);
     const Eigen::VectorXd error = without_shared_zero(day.data, day.weights, rows) - rows + zero;
     for (std::size_t i = 0; i < day.data.rows.size(); i += kRows)
       if (day.data.rows[i].chain == Chain::kMotion) {
@@ -280,9 +279,7 @@ TEST(OneZero, leaves_the_motion_at_least_the_error_with_which_the_torque_tells_i
   for (unsigned seed = 1; seed <= 6; ++seed) {
     OneZero day(10 * seed, 6000);
     day.data.with_free_torque = true;
-    Eigen::VectorXd rows = day.rows;
-    for (std::size_t i = 0; i < day.data.rows.size(); ++i)
-      rows[static_cast<Eigen::Index>(i)] /= day.weights.sigma[static_cast<int>(day.data.rows[i].chain)];
+    const Eigen::VectorXd rows = day.over_sigma(day.rows);
     const Cleaned of_the_motion = [&](const Eigen::VectorXd& left) {
       Eigen::VectorXd out = left;
       for (Eigen::Index i = 0; i + kTogether <= left.size(); i += kTogether)

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "isac/explain/colours.hpp"
 #include "isac/explain/plausible.hpp"
 #include "isac/explain/search.hpp"
 

@@ -17,12 +17,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <functional>
 #include <memory>
 
 #include "isac/explain/prepared.hpp"
 
 namespace isac::explain {
+
+inline constexpr double kWanderMemory = 100;  ///< s, of a zero that wanders
 
 /// Noise of a chain's rows, in units of σ².
 struct Colour {
@@ -57,30 +58,6 @@ void weigh(const Prepared& data, const Weights& weights, Eigen::Ref<Eigen::Matri
 /// The same of each column.
 [[nodiscard]] Eigen::MatrixXd unfiltered_each(const Prepared& data, const Weights& weights,
                                               Eigen::MatrixXd weighted);
-
-/// Noise of one chain from a residual r/σ that holds little else: the slow part from the autocovariance beyond the kernel's
-/// reach, the white part from what is left within it.
-[[nodiscard]] Colour colour_of(const Prepared& data, const Eigen::VectorXd& residual, Chain chain);
-
-/// Slow noise of one memory.
-struct SlowError {
-  double variance = 0;  ///< in the σ² of the rows that it comes from
-  double memory = 0;    ///< s
-};
-
-/// Error of the wandering zero as the filter reads it off rows of this colour, `apart` seconds from each other, once it has settled:
-///   P² = q (P + R),   q = s_d (1 − e^(−2Δt/100 s)),   R = w + 2 s τ/Δt,   memory Δt (P + R)/P
-/// P the variance before a row, q what the zero moves in one, R the density of all other noise at low frequencies. Needs s_d > 0, Δt > 0.
-[[nodiscard]] SlowError error_of_zero(const Colour& colour, double apart);
-
-/// Takes what an effect may have left out of rows r/σ, chain by chain.
-using Cleaned = std::function<Eigen::VectorXd(const Eigen::VectorXd& rows)>;
-
-/// Colours of all chains from what a model leaves, r/σ, `cleaned`, and whether torque and motion have one zero: `weights` with them, ready (take() is
-/// called). That zero is taken off the motion before it is cleaned, for each chain by itself loses another share of it. The error
-/// with which the torque's rows tell it (error_of_zero, by (σ_torque/σ_motion)²) is the least that stays in the motion.
-void take_colours(const Prepared& data, const Eigen::VectorXd& residual, const Cleaned& cleaned,
-                  Weights& weights);
 
 /// Logarithm of the likelihood of a residual r/σ under these colours, but for a constant: −½ Σ (v²/(P + w) + ln(P + w)).
 [[nodiscard]] double log_likelihood(const Prepared& data, const Weights& weights,
