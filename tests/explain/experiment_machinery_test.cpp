@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "isac/explain/filters.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/screen.hpp"
 #include "tied_data.hpp"

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "isac/explain/explain.hpp"
+#include "isac/explain/filters.hpp"
 #include "isac/explain/refine.hpp"
 #include "isac/explain/screen.hpp"
 #include "isac/explain/search.hpp"

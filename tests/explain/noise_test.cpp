@@ -7,6 +7,8 @@
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/colours.hpp"
+#include "isac/explain/encoder_motion.hpp"
+#include "isac/explain/filters.hpp"
 #include "isac/explain/quiet_pressure.hpp"
 #include "isac/explain/weights.hpp"
 #include "tied_data.hpp"
@@ -428,6 +430,39 @@ TEST(QuietVelocity, leaves_nothing_of_a_hands_reversals_that_passes_for_a_memory
     }
   }
   EXPECT_LT(std::abs(along / squares), 1e-4);  // with the second moment alone 3.9e-4
+}
+
+TEST(QuietVelocity, leaves_nothing_of_slow_turns_that_passes_for_friction_which_falls) {
+  // The velocity's error along friction that falls within 0.03 rad/s, which is read off the same counts: rad/s that D takes for friction.
+  const double step = 2 * kPi / 8000, interval = 0.002;
+  double narrow_along = 0, quiet_along = 0, squares = 0;
+  for (int start = 0; start < 36; ++start) {
+    const double turn = 1.2 + 0.15 * (start % 12), most = (0.6 + 0.1 * (start % 12)) / turn;  // rad/s
+    const double kernel_passes = std::exp(-0.5 * std::pow(turn * 3 * interval, 2));
+    std::vector<double> angle, velocity;
+    for (int k = 0; k < 20000; ++k) {
+      const double t = interval * k, drift = 1.3e-3;  // no two turns are alike within a step
+      angle.push_back(step *
+                      std::round(drift * t / step + 0.1 * start - most / turn * std::cos(turn * t) / step));
+      velocity.push_back(drift + most * std::sin(turn * t) * kernel_passes);
+    }
+    const auto along = [&](const std::vector<double>& way, double* norm2) {
+      const std::vector<double> dry = dry_velocity(angle, way, interval, step);
+      double sum = 0;
+      for (std::size_t k = 200; k + 200 < dry.size(); ++k) {
+        if (dry[k] == 0) continue;
+        const double falls = std::copysign(std::exp(-std::pow(dry[k] / 0.03, 2)), dry[k]);
+        sum += falls * (way[k] - velocity[k]);
+        if (norm2 != nullptr) *norm2 += falls * falls;
+      }
+      return sum;
+    };
+    narrow_along += along(low_pass_derivative(angle, 3, interval, 1), nullptr);
+    quiet_along += along(quiet_velocity(angle, 3, interval, step), &squares);
+  }
+  EXPECT_GT(narrow_along / squares, 2e-3);
+  EXPECT_LT(std::abs(quiet_along / squares),
+            4e-4);  // 2.2e-3 with one wider kernel, chosen as if steps were white noise
 }
 
 TEST(QuietVelocity, follows_a_quick_motion_as_the_narrow_kernel_does) {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "isac/explain/encoder_motion.hpp"
 namespace isac::explain {
 namespace {
 

@@ -5,6 +5,7 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/encoder_motion.hpp"
 #include "isac/explain/predict_parts.hpp"
 
 namespace isac::explain {

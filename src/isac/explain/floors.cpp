@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "isac/explain/filters.hpp"
 #include "isac/series/statistics.hpp"
 
 namespace isac::explain {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "isac/explain/encoder_motion.hpp"
 namespace isac::explain {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "isac/explain/filters.hpp"
 #include "isac/explain/predict_parts.hpp"
 #include "isac/explain/workers.hpp"
 

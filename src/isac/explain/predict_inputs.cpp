@@ -5,6 +5,8 @@
 #include <cmath>
 #include <memory>
 
+#include "isac/explain/encoder_motion.hpp"
+#include "isac/explain/filters.hpp"
 #include "isac/explain/predict_parts.hpp"
 #include "isac/explain/slip_moment.hpp"
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "isac/explain/filters.hpp"
 #include "isac/explain/predict.hpp"
 #include "isac/models/effect_hooks.hpp"
 

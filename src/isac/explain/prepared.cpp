@@ -8,6 +8,8 @@
 
 #include "isac/core/error.hpp"
 #include "isac/core/units.hpp"
+#include "isac/explain/encoder_motion.hpp"
+#include "isac/explain/filters.hpp"
 #include "isac/series/derive.hpp"
 #include "isac/series/differentiate.hpp"
 #include "isac/series/statistics.hpp"

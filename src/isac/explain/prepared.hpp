@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "isac/explain/filters.hpp"
+#include "isac/explain/encoder_motion.hpp"
 #include "isac/series/recording.hpp"
 
 namespace isac::explain {

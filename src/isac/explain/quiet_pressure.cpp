@@ -7,6 +7,7 @@
 
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
+#include "isac/explain/filters.hpp"
 #include "isac/explain/screen.hpp"
 #include "isac/explain/workers.hpp"
 
