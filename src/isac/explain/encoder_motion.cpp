@@ -1,6 +1,7 @@
 #include "isac/explain/encoder_motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <utility>
@@ -11,11 +12,12 @@
 namespace isac::explain {
 namespace {
 
-constexpr double kWideKernel = 0.020;                 // s, for velocities that the encoder resolves badly
-constexpr double kQuietKernel = 0.015;                // s, for velocities that change slowly
-constexpr double kQuietKernelOfSlowTurns = 0.030;     // s, where the steps are further apart than that
-constexpr double kQuietKernelOfAcceleration = 0.025;  // s, beside a narrow one of 0.020 s
-constexpr double kQuietKernelOfSwing = 0.050;         // s, which a resonance of up to 18 Hz does not hear
+constexpr double kWideKernel = 0.020;              // s, for velocities that the encoder resolves badly
+constexpr double kQuietKernel = 0.015;             // s, for velocities that change slowly
+constexpr double kQuietKernelOfSlowTurns = 0.030;  // s, where the steps are further apart than that
+constexpr double kNoMoreThanSteps = 1.5, kNoMoreThanSmoothSteps = 4;  // times their power
+constexpr double kQuietKernelOfAcceleration = 0.025;                  // s, beside a narrow one of 0.020 s
+constexpr double kQuietKernelOfSwing = 0.050;  // s, which a resonance of up to 18 Hz does not hear
 
 /// By the kernel, and by a wider one.
 struct TwoWays {
@@ -41,25 +43,30 @@ TwoWays two_ways(std::span<const double> raw_angle, double sigma, double wide_si
   return both;
 }
 
-/// 0 where what the two ways differ by is no more than is expected of the encoder's steps, 1 where it is twice as much.
-std::vector<double> share_beyond(const std::vector<double>& expected, const TwoWays& both,
-                                 double wide_sigma) {
+std::vector<double> difference_of(const TwoWays& both) {
   std::vector<double> difference(both.slow.size());
-  for (std::size_t k = 0; k < difference.size(); ++k)
-    difference[k] = (both.narrow[k] - both.slow[k]) * (both.narrow[k] - both.slow[k]);
-  std::vector<double> share = wide_low_pass(difference, 2 * wide_sigma);
+  for (std::size_t k = 0; k < difference.size(); ++k) difference[k] = both.narrow[k] - both.slow[k];
+  return difference;
+}
+
+/// 0 where the power of x is no more than `most` times what is expected, 1 where it is twice as much.
+std::vector<double> share_beyond(const std::vector<double>& expected, std::vector<double> x,
+                                 double wide_sigma, double most) {
+  for (double& v : x) v *= v;
+  std::vector<double> share = wide_low_pass(x, 2 * wide_sigma);
   for (std::size_t k = 0; k < share.size(); ++k)
-    share[k] = std::clamp((share[k] / expected[k] - 1.5) / 1.5, 0.0, 1.0);
+    share[k] = std::clamp((share[k] / expected[k] - most) / most, 0.0, 1.0);
   return share;
 }
 
-/// The same, of steps as white noise.
+/// Of what two ways differ by, beside the encoder's steps as white noise.
 std::vector<double> share_beyond_steps(const TwoWays& both, double sigma, double wide_sigma, double interval,
                                        double angle_step, int order) {
   double gain = 0;  // of white noise by the derivative
   for (const double g : gaussian(std::max(sigma, 1.0), order)) gain += g * g;
   const double expected = angle_step * angle_step / 12 * gain / std::pow(interval, 2 * order);
-  return share_beyond(std::vector<double>(both.slow.size(), expected), both, wide_sigma);
+  return share_beyond(std::vector<double>(both.slow.size(), expected), difference_of(both), wide_sigma,
+                      kNoMoreThanSteps);
 }
 
 void mix(const std::vector<double>& share, const std::vector<double>& slow, std::vector<double>& narrow) {
@@ -82,54 +89,79 @@ Passes by_wider(double seconds, double wide_seconds) {
   };
 }
 
-/// What an encoder's steps make of a low-passed velocity, (rad/s)²: of white noise, and of the teeth of a saw, |φ̇|/step in a second.
+/// What an encoder's steps make of a low-passed velocity, (rad/s)²: of white noise, and of the teeth of a saw, |φ̇|/step in a second, from a table by
+/// speed. `seconds`: of a kernel that passes no less.
 class OfSteps {
  public:
-  OfSteps(Passes passes, double angle_step, double interval)
-      : passes_(std::move(passes)), angle_step_(angle_step) {
-    constexpr int kParts = 4000;
+  OfSteps(const Passes& passes, double seconds, double angle_step, double interval) {
+    const auto through = [&](double turns) {
+      const double velocity = turns * passes(turns);
+      return velocity * velocity;
+    };
     for (int k = 0; k < kParts; ++k) white_ += through((k + 0.5) / kParts * kPi / interval);
     white_ *= angle_step * angle_step / 12 / kParts;
+    const double fastest = kNothing / seconds;  // rad/s of a first harmonic
+    per_speed_ = 2 * kPi / angle_step * kParts / fastest;
+    for (int i = 0; i <= kParts; ++i) {
+      const double turns = fastest * i / kParts;
+      for (int k = 1; k <= kHarmonics && k * turns < fastest; ++k)
+        teeth_[static_cast<std::size_t>(i)] += through(k * turns) / (k * k);
+      teeth_[static_cast<std::size_t>(i)] *= 0.5 * angle_step * angle_step / (kPi * kPi);
+    }
   }
   [[nodiscard]] double white() const noexcept { return white_; }
-  [[nodiscard]] double teeth(double speed) const {
-    const double turns = 2 * kPi * std::abs(speed) / angle_step_;
-    double sum = 0;
-    for (int k = 1; k <= kHarmonics; ++k) {
-      const double harmonic = through(k * turns) / (k * k);
-      sum += harmonic;
-      if (harmonic <= 1e-6 * sum) break;
-    }
-    return 0.5 * angle_step_ * angle_step_ / (kPi * kPi) * sum;
+  [[nodiscard]] double teeth(double speed) const noexcept {
+    const double at = std::abs(speed) * per_speed_;
+    if (!(at < kParts)) return 0;
+    const auto i = static_cast<std::size_t>(at);
+    return teeth_[i] + (at - static_cast<double>(i)) * (teeth_[i + 1] - teeth_[i]);
   }
+  [[nodiscard]] bool stand_out(double speed) const noexcept { return teeth(speed) > white_; }
 
  private:
-  static constexpr int kHarmonics = 12;  // a joint whose steps pass more of them stands still
+  static constexpr int kParts = 500, kHarmonics = 12;  // a joint whose steps pass more of them stands still
+  static constexpr double kNothing = 6;                // e^(−½ 6²) is
 
-  [[nodiscard]] double through(double turns) const {
-    const double passes = turns * passes_(turns);
-    return passes * passes;
-  }
-  Passes passes_;
-  double angle_step_, white_ = 0;
+  double white_ = 0, per_speed_ = 0;
+  std::array<double, kParts + 1> teeth_{};
 };
 
-/// The wider way where what the two differ by is no more than the steps make of the narrow one; `among_teeth`: only about where their teeth stand out.
-void quieten_steps(TwoWays& both, const OfSteps& steps, double wide_sigma, bool among_teeth) {
-  std::vector<double> expected(both.slow.size()), stand_out(both.slow.size());
-  for (std::size_t k = 0; k < expected.size(); ++k) {
-    const double teeth = steps.teeth(both.slow[k]);
-    expected[k] = std::max(steps.white(), teeth);
-    stand_out[k] = teeth > steps.white() ? 1.0 : 0.0;
-  }
-  std::vector<double> share = share_beyond(wide_low_pass(expected, 2 * wide_sigma), both, wide_sigma);
-  if (among_teeth) {
-    constexpr double kPartOfReach = 0.25;  // of the time within the kernel
-    stand_out = wide_low_pass(stand_out, wide_sigma);
-    for (std::size_t k = 0; k < share.size(); ++k)
-      share[k] = std::max(share[k], 1 - stand_out[k] / kPartOfReach);
-  }
-  mix(share, both.slow, both.narrow);
+/// Two low-passes of a velocity, what they leave of the encoder's steps, and of the steps in the smooth part of their difference.
+struct StepsOfTwoWays {
+  StepsOfTwoWays(const Passes& narrow, double seconds, const Passes& slow, double wide_seconds,
+                 double angle_step, double interval)
+      : of_narrow(narrow, seconds, angle_step, interval),
+        smooth([&narrow, &slow, kernel = by_kernel(wide_seconds)](
+                   double turns) { return (narrow(turns) - slow(turns)) * kernel(turns); },
+               seconds, angle_step, interval) {}
+  OfSteps of_narrow, smooth;
+};
+
+std::vector<double> expected_of(const OfSteps& steps, const std::vector<double>& speed, double wide_sigma) {
+  std::vector<double> expected(speed.size());
+  for (std::size_t k = 0; k < expected.size(); ++k)
+    expected[k] = std::max(steps.white(), steps.teeth(speed[k]));
+  return wide_low_pass(expected, 2 * wide_sigma);
+}
+
+/// The wider way where it loses nothing of the motion: where what the two differ by is no more than the steps make of the narrow one, and where what
+/// is smooth of it, to which the steps give little, is no more than they give.
+std::vector<double> share_of_narrow(const TwoWays& both, const StepsOfTwoWays& steps, double wide_sigma) {
+  const std::vector<double> difference = difference_of(both);
+  std::vector<double> share = share_beyond(expected_of(steps.of_narrow, both.slow, wide_sigma), difference,
+                                           wide_sigma, kNoMoreThanSteps);
+  const std::vector<double> of_motion =
+      share_beyond(expected_of(steps.smooth, both.slow, wide_sigma), low_pass(difference, wide_sigma),
+                   wide_sigma, kNoMoreThanSmoothSteps);
+  for (std::size_t k = 0; k < share.size(); ++k) share[k] = std::max(share[k], of_motion[k]);
+  return share;
+}
+
+/// How much of the time within a kernel the teeth stand out of the steps' white noise.
+std::vector<double> teeth_stand_out(const OfSteps& steps, const std::vector<double>& speed, double sigma) {
+  std::vector<double> out(speed.size());
+  for (std::size_t k = 0; k < out.size(); ++k) out[k] = steps.stand_out(speed[k]) ? 1.0 : 0.0;
+  return wide_low_pass(out, sigma);
 }
 
 bool is_known(double angle_step) {
@@ -140,13 +172,24 @@ bool is_known(double angle_step) {
 
 std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma, double interval,
                                    double angle_step) {
-  const double seconds = sigma * interval, wide = kQuietKernel / interval,
+  constexpr double kPartOfReach = 0.25;
+  const double seconds = std::max(sigma, 1.0) * interval, wide = kQuietKernel / interval,
                wider = kQuietKernelOfSlowTurns / interval;
   if (!is_known(angle_step) || wide <= sigma) return low_pass_derivative(raw_angle, sigma, interval, 1);
   TwoWays both = two_ways(raw_angle, sigma, wide, interval, 1);
-  quieten_steps(both, OfSteps(by_kernel(seconds), angle_step, interval), wide, false);
+  const Passes narrow = by_kernel(seconds), quiet = by_wider(sigma * interval, kQuietKernel),
+               quieter = by_wider(sigma * interval, kQuietKernelOfSlowTurns);
+  mix(share_of_narrow(both, {narrow, seconds, quiet, kQuietKernel, angle_step, interval}, wide), both.slow,
+      both.narrow);
+  const StepsOfTwoWays left(quiet, kQuietKernel, quieter, kQuietKernelOfSlowTurns, angle_step, interval);
+  if (std::none_of(both.slow.begin(), both.slow.end(), [&](double v) { return left.of_narrow.stand_out(v); }))
+    return std::move(both.narrow);
   both.slow = two_ways(raw_angle, sigma, wider, interval, 1).slow;
-  quieten_steps(both, OfSteps(by_wider(seconds, kQuietKernel), angle_step, interval), wider, true);
+  const std::vector<double> among_teeth = teeth_stand_out(left.of_narrow, both.slow, wider);
+  std::vector<double> share = share_of_narrow(both, left, wider);
+  for (std::size_t k = 0; k < share.size(); ++k)
+    share[k] = std::max(share[k], 1 - among_teeth[k] / kPartOfReach);
+  mix(share, both.slow, both.narrow);
   return std::move(both.narrow);
 }
 

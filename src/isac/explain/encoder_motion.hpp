@@ -3,8 +3,9 @@
 ///
 ///   quiet: w = g_w′ ∗ φ, u = 1 − g_w∗, α = σ²/σ_w²      w + (1 − α) u w + ½ (1 − α)(2 − α) u² w ≈ g′ ∗ φ,  σ_w > σ
 ///
-/// where what it differs by from g′ ∗ φ is no more than the steps make; second and fourth moments are g's. Steps make white noise of variance
-/// step²/12, or at a speed v of which few pass within the kernel the teeth of a saw: 2 v² Σ_k H(2π k v/step)² of a velocity, H the low-pass.
+/// where what it differs by from g′ ∗ φ, and the smooth part of that, is no more than the steps make; second and fourth moments are g's. Steps make
+/// white noise of variance step²/12, or at a speed v of which few pass within the kernel the teeth of a saw: 2 v² Σ_k H(2π k v/step)² of a velocity, H
+/// the low-pass.
 /// Units: σ in samples, intervals s, angles rad. Threads: pure. Errors: none; ends are continued by their last value.
 /// Source: docs/derivations/explain.md, "The encoder's noise in φ̇", "Slow turns".
 #pragma once
