@@ -16,7 +16,7 @@ constexpr double kWideKernel = 0.020;              // s, for velocities that the
 constexpr double kQuietKernel = 0.015;             // s, for velocities that change slowly
 constexpr double kQuietKernelOfSlowTurns = 0.030;  // s, where the steps are further apart than that
 constexpr double kNoMoreThanSteps = 1.5, kNoMoreThanSmoothSteps = 10;  // times their power
-constexpr double kQuietKernelOfAcceleration = 0.025;                  // s, beside a narrow one of 0.020 s
+constexpr double kQuietKernelOfAcceleration = 0.025;                   // s, beside a narrow one of 0.020 s
 constexpr double kQuietKernelOfSwing = 0.050;  // s, which a resonance of up to 18 Hz does not hear
 
 /// By the kernel, and by a wider one.
