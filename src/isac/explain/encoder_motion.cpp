@@ -28,19 +28,29 @@ std::vector<double> derivative_of(std::span<const double> x, double sigma, doubl
   return order == 0 ? low_pass(x, sigma) : low_pass_derivative(x, sigma, interval, order);
 }
 
+/// 1 − α, α = σ²/σ_w².
+double bend_of(double sigma, double wide_sigma) {
+  return 1 - sigma * sigma / (wide_sigma * wide_sigma);
+}
+
 /// w = g_w′ ∗ φ, u = 1 − g_w∗: w + (1 − α) u w + ½ (1 − α)(2 − α) u² w, α = σ²/σ_w², the beginning of (1 − u)^(α−1) w, has the second and the
 /// fourth moment of g: a smooth motion passes it as it passes g′. (With the second alone a hand's reversals left 8e-5 N m s of a velocity that
 /// is remembered for 0.1 s, two sigma in every day.)
-TwoWays two_ways(std::span<const double> raw_angle, double sigma, double wide_sigma, double interval,
-                 int order) {
-  TwoWays both{.narrow = derivative_of(raw_angle, sigma, interval, order), .slow = {}};
+std::vector<double> by_wider_way(std::span<const double> raw_angle, double sigma, double wide_sigma,
+                                 double interval, int order) {
   const std::vector<double> wide = derivative_of(raw_angle, wide_sigma, interval, order),
                             wider = low_pass(wide, wide_sigma), widest = low_pass(wider, wide_sigma);
-  const double bend = 1 - sigma * sigma / (wide_sigma * wide_sigma), second = 0.5 * bend * (1 + bend);
-  both.slow.resize(wide.size());
+  const double bend = bend_of(sigma, wide_sigma), second = 0.5 * bend * (1 + bend);
+  std::vector<double> slow(wide.size());
   for (std::size_t k = 0; k < wide.size(); ++k)
-    both.slow[k] = wide[k] + bend * (wide[k] - wider[k]) + second * (wide[k] - 2 * wider[k] + widest[k]);
-  return both;
+    slow[k] = wide[k] + bend * (wide[k] - wider[k]) + second * (wide[k] - 2 * wider[k] + widest[k]);
+  return slow;
+}
+
+TwoWays two_ways(std::span<const double> raw_angle, double sigma, double wide_sigma, double interval,
+                 int order) {
+  return {.narrow = derivative_of(raw_angle, sigma, interval, order),
+          .slow = by_wider_way(raw_angle, sigma, wide_sigma, interval, order)};
 }
 
 std::vector<double> difference_of(const TwoWays& both) {
@@ -59,12 +69,12 @@ std::vector<double> share_beyond(const std::vector<double>& expected, std::vecto
   return share;
 }
 
-/// Of what two ways differ by, beside the encoder's steps as white noise.
+/// Of what two accelerations differ by, beside the encoder's steps as white noise.
 std::vector<double> share_beyond_steps(const TwoWays& both, double sigma, double wide_sigma, double interval,
-                                       double angle_step, int order) {
-  double gain = 0;  // of white noise by the derivative
-  for (const double g : gaussian(std::max(sigma, 1.0), order)) gain += g * g;
-  const double expected = angle_step * angle_step / 12 * gain / std::pow(interval, 2 * order);
+                                       double angle_step) {
+  double gain = 0;  // of white noise by the second derivative
+  for (const double g : gaussian(std::max(sigma, 1.0), 2)) gain += g * g;
+  const double expected = angle_step * angle_step / 12 * gain / std::pow(interval, 4);
   return share_beyond(std::vector<double>(both.slow.size(), expected), difference_of(both), wide_sigma,
                       kNoMoreThanSteps);
 }
@@ -80,11 +90,10 @@ Passes by_kernel(double seconds) {
   return [seconds](double turns) { return std::exp(-0.5 * turns * seconds * turns * seconds); };
 }
 
-/// By a wider kernel and its own bend (two_ways).
+/// By a wider kernel and its own bend (by_wider_way).
 Passes by_wider(double seconds, double wide_seconds) {
   return [=](double turns) {
-    const double g = by_kernel(wide_seconds)(turns), u = 1 - g,
-                 bend = 1 - seconds * seconds / (wide_seconds * wide_seconds);
+    const double g = by_kernel(wide_seconds)(turns), u = 1 - g, bend = bend_of(seconds, wide_seconds);
     return g * (1 + bend * u * (1 + 0.5 * (1 + bend) * u));
   };
 }
@@ -172,7 +181,7 @@ bool is_known(double angle_step) {
 
 std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sigma, double interval,
                                    double angle_step) {
-  constexpr double kPartOfReach = 0.25;
+  constexpr double kPartOfReach = 0.25;  // of the wider kernel, among teeth: there it counts in full
   const double seconds = std::max(sigma, 1.0) * interval, wide = kQuietKernel / interval,
                wider = kQuietKernelOfSlowTurns / interval;
   if (!is_known(angle_step) || wide <= sigma) return low_pass_derivative(raw_angle, sigma, interval, 1);
@@ -184,7 +193,7 @@ std::vector<double> quiet_velocity(std::span<const double> raw_angle, double sig
   const StepsOfTwoWays left(quiet, kQuietKernel, quieter, kQuietKernelOfSlowTurns, angle_step, interval);
   if (std::none_of(both.slow.begin(), both.slow.end(), [&](double v) { return left.of_narrow.stand_out(v); }))
     return std::move(both.narrow);
-  both.slow = two_ways(raw_angle, sigma, wider, interval, 1).slow;
+  both.slow = by_wider_way(raw_angle, sigma, wider, interval, 1);
   const std::vector<double> among_teeth = teeth_stand_out(left.of_narrow, both.slow, wider);
   std::vector<double> share = share_of_narrow(both, left, wider);
   for (std::size_t k = 0; k < share.size(); ++k)
@@ -198,7 +207,7 @@ std::vector<double> quiet_acceleration(std::span<const double> raw_angle, double
   const double wide = kQuietKernelOfAcceleration / interval;
   if (!is_known(angle_step) || wide <= sigma) return low_pass_derivative(raw_angle, sigma, interval, 2);
   TwoWays both = two_ways(raw_angle, sigma, wide, interval, 2);
-  mix(share_beyond_steps(both, sigma, wide, interval, angle_step, 2), both.slow, both.narrow);
+  mix(share_beyond_steps(both, sigma, wide, interval, angle_step), both.slow, both.narrow);
   return std::move(both.narrow);
 }
 
@@ -297,7 +306,7 @@ Motion quiet_motion(std::span<const double> raw_angle, double sigma, double inte
             derivative_of(angle, sigma, interval, 2), lead, from_rest};
   TwoWays orders[3];
   for (int order = 0; order < 3; ++order) orders[order] = two_ways(angle, sigma, wide, interval, order);
-  const std::vector<double> share = share_beyond_steps(orders[2], sigma, wide, interval, angle_step, 2);
+  const std::vector<double> share = share_beyond_steps(orders[2], sigma, wide, interval, angle_step);
   for (TwoWays& both : orders) mix(share, both.slow, both.narrow);
   return {std::move(orders[0].narrow), std::move(orders[1].narrow), std::move(orders[2].narrow), lead,
           from_rest};
