@@ -109,5 +109,66 @@ TEST(FirstPressure, is_told_by_as_long_as_the_command_stands_still) {
   EXPECT_LT(std::sqrt(squares), 0.0009 * kPascalPerKgfCm2);
 }
 
+/// A free joint on its muscles, J φ̈ = k φ + b p − D φ̇ exactly, with a pressure that follows steps of its command by a lag.
+series::Recording stepped(const RigFacts& rig) {
+  constexpr double kStiffness = -8.5, kDamping = 0.14, kGain = 3.4e-5, kLag = 0.17;
+  constexpr int kParts = 20;
+  series::Recording run;
+  run.source = "run.csv";
+  run.metadata["experiment"] = "free";
+  const char* names[] = {"time", "angle", "p1", "p2", "p1_cmd", "p2_cmd", "F1", "F2"};
+  const char* units[] = {"s", "rad", "Pa", "Pa", "Pa", "Pa", "N", "N"};
+  for (int c = 0; c < 8; ++c) run.columns.push_back({names[c], units[c], {}});
+  double phi = 0, w = 0, p = 0;  // p: half of p2 − p1
+  for (int k = 0; k < 15000; ++k) {
+    const double command = (k / 1100 % 2 == 0 ? 1 : -1) * (0.4 + 0.1 * (k / 1100 % 3)) * kPascalPerKgfCm2;
+    const double T = kStiffness * phi + kGain * p - kDamping * w, pull = T / (2 * rig.wheel_radius),
+                 p0 = 3 * kPascalPerKgfCm2;
+    const double row[] = {kInterval * k, phi,          p0 - p,     p0 + p,
+                          p0 - command,  p0 + command, 100 - pull, 100 + pull};
+    for (std::size_t c = 0; c < 8; ++c) run.columns[c].values.push_back(row[c]);
+    for (int i = 0; i < kParts; ++i) {
+      const double h = kInterval / kParts, half = std::exp(-0.5 * h / kLag),
+                   middle = command + half * (p - command), end = command + half * (middle - command);
+      const auto a = [&](double angle, double speed, double pressure) {
+        return (kStiffness * angle + kGain * pressure - kDamping * speed) / rig.inertia;
+      };
+      const double a1 = a(phi, w, p), a2 = a(phi + 0.5 * h * w, w + 0.5 * h * a1, middle),
+                   a3 = a(phi + 0.5 * h * w + 0.25 * h * h * a1, w + 0.5 * h * a2, middle),
+                   a4 = a(phi + h * w + 0.5 * h * h * a2, w + h * a3, end);
+      phi += h * w + h * h / 6 * (a1 + a2 + a3);
+      w += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+      p = end;
+    }
+  }
+  return run;
+}
+
+// Where a command jumps the torque bends at a sample, and what the kernel makes of its samples is not I g″ ∗ φ.
+TEST(Motion, is_not_held_against_a_torque_that_bends_within_its_kernel) {
+  RigFacts rig = test::TiedRig{}.facts();
+  rig.angle_step = std::nan("");
+  const series::Recording recording = stepped(rig);
+  const Prepared data = prepare({&recording, 1}, rig, {}, 2.0);
+  const PreparedRun& run = data.runs.front();
+  // Of the inertia, what the torque says it is too large by.
+  const auto too_large = [&](const std::vector<std::size_t>& at) {
+    double product = 0, squares = 0;
+    for (const std::size_t k : at) {
+      const double a = run.slow_acceleration[k];
+      product += a * (run.slow_torque[k] / rig.inertia - a);
+      squares += a * a;
+    }
+    return product / squares;
+  };
+  std::vector<std::size_t> all, rows, of_torque;
+  for (std::size_t k = 100; k + 100 < run.time.size(); ++k) all.push_back(k);
+  for (const Row& row : data.rows) (row.chain == Chain::kMotion ? rows : of_torque).push_back(row.sample);
+  EXPECT_LT(too_large(all), -1e-4);
+  EXPECT_NEAR(too_large(rows), 0, 1e-5);
+  EXPECT_GT(static_cast<double>(rows.size()),
+            0.9 * static_cast<double>(run.time.size() / static_cast<std::size_t>(data.stride)) - 100);
+}
+
 }  // namespace
 }  // namespace isac::explain
