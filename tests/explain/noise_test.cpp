@@ -661,6 +661,47 @@ TEST(QuietPressure, knows_the_error_of_a_runs_mean_though_readings_are_missing) 
   }
 }
 
+// The lag by which a sensor's noise is known is fitted to that noise: what it is off by stands in the torque of all runs alike.
+TEST(QuietPressure, knows_what_the_error_of_the_fitted_lag_makes) {
+  test::TiedRig rig;
+  rig.pressure_noise = 0;
+  PlannedRun steps = test::clamped(20, 0.1, 1.2, 5, "steps"), sines = test::clamped(20, -0.2, 1.0, 4);
+  const std::vector<series::Recording> clean =
+      test::record_all(rig, {steps, sines, test::by_hand(20, 0.4, 1.5)});
+  const Prepared truth = prepare(clean, rig.facts(), {}, 2.0);
+  std::mt19937_64 random(17);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 40;
+  double squares = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<series::Recording> runs = clean;
+    const double stay = std::exp(-0.002 / 0.1), fresh = std::sqrt(1 - stay * stay);
+    for (series::Recording& run : runs)
+      for (series::Column& c : run.columns) {
+        if (c.name != "p1" && c.name != "p2") continue;
+        double z = normal(random);
+        for (double& p : c.values) p += 2000 * (z = stay * z + fresh * normal(random));  // Pa
+      }
+    Prepared data = prepare(runs, rig.facts(), {}, 2.0);
+    (void)QuietPressure::learn(data);
+    double product = 0, norm2 = 0;
+    for (std::size_t r = 0; r < data.runs.size(); ++r) {
+      const PreparedRun& run = data.runs[r];
+      ASSERT_EQ(run.lag_pressure_error.size(), run.time.size());
+      for (std::size_t k = 0; k < run.time.size(); ++k) {
+        const double e = run.lag_pressure_error[k];
+        const auto half = [&](const auto& p) { return 0.5 * (p[1][k] - p[0][k]); };
+        product += e * (half(run.pressure) - half(truth.runs[r].smooth_pressure));
+        norm2 += e * e;
+      }
+    }
+    ASSERT_GT(norm2, 0);
+    squares += product / norm2 * (product / norm2);
+  }
+  EXPECT_GT(squares / kDraws, 0.5);
+  EXPECT_LT(squares / kDraws, 1.8);
+}
+
 TEST(QuietPressure, leaves_readings_alone_without_commands) {
   const test::TiedRig rig;
   auto runs = test::record_all(rig, {test::by_hand(20, 0.4, 1.5), test::by_hand(20, 0.3, 0.7)});

@@ -245,7 +245,7 @@ TEST(Judge, counts_the_error_that_all_blocks_of_a_run_share) {
     for (const bool known : {true, false}) {
       Screen screen = resting_screen(0, shared, false, random);
       Column& c = screen.columns[0];
-      if (known) c.run_error = Eigen::VectorXd::Constant(kRuns, shared * c.norm2 / kRuns);
+      if (known) c.shared_error = Eigen::VectorXd::Constant(kRuns, shared * c.norm2 / kRuns);
       judge(screen, setting.data, setting.library, {.flips = 19});
       (known ? counted : ignored) += c.T > 1.96 ? 1 : 0;
       if (known) small += screen.p_value <= 0.05 ? 1 : 0;

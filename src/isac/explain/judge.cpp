@@ -40,11 +40,12 @@ Jackknife jackknife(const Eigen::VectorXd& left, const Eigen::VectorXd& norm2) {
           all * all / norm2.squaredNorm()};
 }
 
-double jackknife_p(const Eigen::VectorXd& score, const Eigen::VectorXd& norm2, double run_error2) {
-  const Jackknife of = jackknife(score - score.sum() / norm2.sum() * norm2, norm2);
+double jackknife_p(double score, const Eigen::VectorXd& noise, const Eigen::VectorXd& norm2,
+                   double shared_error2) {
+  const Jackknife of = jackknife(noise - score / norm2.sum() * norm2, norm2);
   if (!(of.carried_by > 2)) return 1;  // no freedom is left
-  const double scatter = std::sqrt(of.scatter * of.scatter + run_error2);
-  return scatter > 0 ? series::student_t_two_sided(std::abs(score.sum()) / scatter, of.carried_by - 1) : 1.0;
+  const double scatter = std::sqrt(of.scatter * of.scatter + shared_error2);
+  return scatter > 0 ? series::student_t_two_sided(std::abs(score) / scatter, of.carried_by - 1) : 1.0;
 }
 
 /// Degrees of freedom of a variance that is F > 1 times one told by many, the rest told by few (Satterthwaite): F²/(1/ν + (F − 1)²/ν_few).
@@ -80,7 +81,7 @@ class ScatterElsewhere {
     for (const Column& c : columns) {
       if (c.hypothesis >= 0 || c.norm2 <= 0) continue;
       Functions& f = chains_[static_cast<int>(c.chain)];
-      f.score2.push_back(joined(c.atom_score).cwiseAbs2());
+      f.score2.push_back(joined(c.noise()).cwiseAbs2());
       f.norm2.push_back(joined(c.atom_norm));
     }
   }
@@ -171,15 +172,21 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
   return test;
 }
 
-Eigen::VectorXd error_of_means(const Around& place) {
+ErrorsOfReading errors_of_reading(const Around& place) {
   const Prepared& data = place.predictor->data();
-  Eigen::VectorXd torque = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.rows.size()));
+  const auto rows = static_cast<Eigen::Index>(data.rows.size());
+  ErrorsOfReading errors{.means = Eigen::VectorXd::Zero(rows), .lag = Eigen::VectorXd::Zero(rows)};
   const double gain = place.predictor->pressure_gain(place.fit->model);
-  for (std::size_t i = 0; i < data.rows.size(); ++i)
-    if (data.rows[i].chain == Chain::kTorque)
-      torque[static_cast<Eigen::Index>(i)] = gain * data.runs[data.rows[i].run].mean_pressure_error;
-  if (torque.squaredNorm() > 0) weigh(data, *place.weights, torque);
-  return torque;
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const Row& row = data.rows[static_cast<std::size_t>(i)];
+    const PreparedRun& run = data.runs[row.run];
+    if (row.chain != Chain::kTorque) continue;
+    errors.means[i] = gain * run.mean_pressure_error;
+    if (!run.lag_pressure_error.empty()) errors.lag[i] = gain * run.lag_pressure_error[row.sample];
+  }
+  for (Eigen::VectorXd* torque : {&errors.means, &errors.lag})
+    if (torque->squaredNorm() > 0) weigh(data, *place.weights, *torque);
+  return errors;
 }
 
 Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept, int hypothesis,
@@ -187,7 +194,7 @@ Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses&
   const Prepared& data = place.predictor->data();
   Yardstick yardstick{.hypothesis = hypothesis,
                       .functions = {},
-                      .own_p = p_of_refit(data, place.residual, residual, error_of_means(place))};
+                      .own_p = p_of_refit(data, place.residual, residual, errors_of_reading(place))};
   std::size_t function = 0;
   for (const Column& known : screen.columns) {
     if (known.hypothesis >= 0) continue;
@@ -212,30 +219,32 @@ namespace {
 /// What a refit closed, before − after, block by block.
 struct Closed {
   Eigen::VectorXd left, norm2;  ///< Σ after·closed, Σ closed²
-  double score = 0, run_error2 = 0;
+  double score = 0, shared_error2 = 0;
   std::vector<Eigen::Index> run_of_block;
   Jackknife own;
 };
 
 std::optional<Closed> closed_by(const Prepared& data, const Eigen::VectorXd& before,
-                                const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means) {
+                                const Eigen::VectorXd& after, const ErrorsOfReading& errors) {
   const auto blocks = static_cast<Eigen::Index>(data.blocks);
   Closed c;
   c.left = c.norm2 = Eigen::VectorXd::Zero(blocks);
   c.run_of_block.assign(data.blocks, 0);
   Eigen::VectorXd run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.runs.size()));
+  double lag_error = 0;
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i), block = static_cast<Eigen::Index>(data.rows[i].block);
     const double closed = before[row] - after[row];
     c.norm2[block] += closed * closed;
     c.left[block] += after[row] * closed;
     c.run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
-    if (error_of_means.size() > 0)
-      run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * error_of_means[row];
+    if (errors.means.size() == 0) continue;
+    run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * errors.means[row];
+    lag_error += closed * errors.lag[row];
   }
   if (!(c.norm2.sum() > 0)) return std::nullopt;
   c.score = c.norm2.sum() + c.left.sum();
-  c.run_error2 = run_error.squaredNorm();
+  c.shared_error2 = run_error.squaredNorm() + lag_error * lag_error;
   c.own = jackknife(c.left, c.norm2);
   return c;
 }
@@ -243,10 +252,10 @@ std::optional<Closed> closed_by(const Prepared& data, const Eigen::VectorXd& bef
 }  // namespace
 
 double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
-                  const Eigen::VectorXd& error_of_means) {
-  const std::optional<Closed> c = closed_by(data, before, after, error_of_means);
+                  const ErrorsOfReading& errors) {
+  const std::optional<Closed> c = closed_by(data, before, after, errors);
   if (!c || !(c->own.carried_by > 2) || !(c->own.scatter > 0)) return 1;
-  const double scatter = std::sqrt(c->own.scatter * c->own.scatter + c->run_error2);
+  const double scatter = std::sqrt(c->own.scatter * c->own.scatter + c->shared_error2);
   const double p = series::student_t_two_sided(std::abs(c->score) / scatter, c->own.carried_by - 1);
   return std::max(
       p, p_by_runs(c->score, c->left, c->norm2, c->run_of_block, static_cast<Eigen::Index>(data.runs.size()))
@@ -254,16 +263,16 @@ double p_of_refit(const Prepared& data, const Eigen::VectorXd& before, const Eig
 }
 
 double p_in_its_blocks(const Prepared& data, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
-                       const Eigen::VectorXd& error_of_means, const Elsewhere& elsewhere) {
-  const std::optional<Closed> c = closed_by(data, before, after, error_of_means);
+                       const ErrorsOfReading& errors, const Elsewhere& elsewhere) {
+  const std::optional<Closed> c = closed_by(data, before, after, errors);
   if (!c || !(elsewhere.unit > 0)) return 1;
   const double variance = elsewhere.unit * c->norm2.sum(),
                louder = c->own.carried_by > 2 ? c->own.scatter * c->own.scatter / variance : 1.0;
   if (!(louder > 1))
-    return series::student_t_two_sided(std::abs(c->score) / std::sqrt(variance + c->run_error2),
+    return series::student_t_two_sided(std::abs(c->score) / std::sqrt(variance + c->shared_error2),
                                        elsewhere.blocks);
   const double few = c->own.carried_by - 1, F = (kAsElsewhere + few * louder) / (kAsElsewhere + few);
-  return series::student_t_two_sided(std::abs(c->score) / std::sqrt(F * variance + c->run_error2),
+  return series::student_t_two_sided(std::abs(c->score) / std::sqrt(F * variance + c->shared_error2),
                                      freedom_of_both(F, elsewhere.blocks, kAsElsewhere + few));
 }
 
@@ -312,7 +321,7 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     c.rare_p = 1;
     c.elsewhere = {};
     if (c.norm2 <= 0) continue;
-    const double scatter2 = joined(c.atom_score).squaredNorm() + c.run_error.squaredNorm();
+    const double scatter2 = joined(c.noise()).squaredNorm() + c.shared_error.squaredNorm();
     c.T = scatter2 > 0 ? std::abs(c.score) / std::sqrt(scatter2) : 0;
     c.unit = scatter2 / c.norm2;
     c.carried_by = c.norm2 * c.norm2 / joined(c.atom_norm).squaredNorm();
@@ -321,16 +330,17 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
     if (c.carried_by >= kCarryingBlocks) units.push_back(c.unit);
   }
   if (!units.empty()) result.noise_unit = std::max(0.05, series::median(units));
-  const auto runs = static_cast<Eigen::Index>(data.runs.size());
+  Eigen::Index shared = 0;
+  for (const Column& c : result.columns) shared = std::max(shared, c.shared_error.size());
   Eigen::MatrixXd scores =
-      Eigen::MatrixXd::Zero(blocks + runs, static_cast<Eigen::Index>(result.columns.size()));
+      Eigen::MatrixXd::Zero(blocks + shared, static_cast<Eigen::Index>(result.columns.size()));
   double rare_columns = 0;
   const ScatterElsewhere elsewhere(result.columns, joined, seen), beside(yardstick.functions, joined, seen);
   for (std::size_t k = 0; k < result.columns.size(); ++k) {
     Column& c = result.columns[k];
-    const Eigen::VectorXd score = joined(c.atom_score);
-    scores.col(static_cast<Eigen::Index>(k)).head(blocks) = score;
-    if (c.run_error.size() > 0) scores.col(static_cast<Eigen::Index>(k)).tail(runs) = c.run_error;
+    const Eigen::VectorXd noise = joined(c.noise());
+    scores.col(static_cast<Eigen::Index>(k)).head(blocks) = noise;
+    scores.col(static_cast<Eigen::Index>(k)).segment(blocks, c.shared_error.size()) = c.shared_error;
     double most = 0;
     for (int chain = 0; chain < kChains; ++chain)
       if ((chains_of(c) & (1U << chain)) != 0) most = std::max(most, chain_blocks[chain]);
@@ -348,10 +358,10 @@ void judge(Screen& result, const Prepared& data, const Library& library, const S
       }
       if (std::isfinite(c.elsewhere.unit))
         c.rare_p = series::student_t_two_sided(
-            std::abs(c.score) / std::sqrt(c.elsewhere.unit * c.norm2 + c.run_error.squaredNorm()),
+            std::abs(c.score) / std::sqrt(c.elsewhere.unit * c.norm2 + c.shared_error.squaredNorm()),
             c.elsewhere.blocks);
     } else {
-      c.rare_p = jackknife_p(score, own, c.run_error.squaredNorm());
+      c.rare_p = jackknife_p(c.score, noise, own, c.shared_error.squaredNorm());
     }
     c.rare_p = std::max(c.rare_p, told_by_runs(c).value_or(0));
     if (const auto least = yardstick.least_p.find(c.hypothesis); least != yardstick.least_p.end())

@@ -40,15 +40,16 @@ struct SomeRuns {
     }
   }
 
-  /// Of the blocks, and what the error of each run's mean pressure makes of it.
-  Eigen::Index scores() const { return static_cast<Eigen::Index>(data.blocks + data.runs.size()); }
+  /// Of the blocks, and what the errors that runs and the day share make of it.
+  Eigen::Index scores() const { return static_cast<Eigen::Index>(data.blocks + data.runs.size()) + 1; }
   Eigen::VectorXd scores_of(std::size_t function) const {
     const Column& c = *functions[function];
     Eigen::VectorXd scores_of_blocks = Eigen::VectorXd::Zero(scores());
     if (!(c.norm2 > 0)) return scores_of_blocks;
-    for (Eigen::Index a = 0; a < c.atom_score.size(); ++a)
-      scores_of_blocks[data.block_of_atom[static_cast<std::size_t>(a)]] += c.atom_score[a];
-    if (c.run_error.size() > 0) scores_of_blocks.tail(c.run_error.size()) = c.run_error;
+    const Eigen::VectorXd& noise = c.noise();
+    for (Eigen::Index a = 0; a < noise.size(); ++a)
+      scores_of_blocks[data.block_of_atom[static_cast<std::size_t>(a)]] += noise[a];
+    if (c.shared_error.size() > 0) scores_of_blocks.tail(c.shared_error.size()) = c.shared_error;
     return scores_of_blocks;
   }
 

@@ -58,6 +58,8 @@ struct PreparedRun {
   std::vector<double> raw_pressure[2];  ///< Pa as read
   double mean_pressure_error =
       0;  ///< Pa, of the whole run's mean of (p2 − p1)/2, where its noise was taken out of the rest
+  /// Pa, what one deviation of the valves' fitted lag makes of (p2 − p1)/2 there; empty: nothing was taken out.
+  std::vector<double> lag_pressure_error;
   std::vector<double> smooth_pressure[2];  ///< Pa, low-passed: what the valve unit's model is held against
   /// Pa, what enters the torque: low-passed more where the pressure rests, so that its noise does not pass for torque.
   std::vector<double> pressure[2];

@@ -1,9 +1,11 @@
 #include "isac/explain/projection.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 
+#include "isac/estimate/linear_algebra.hpp"
 #include "isac/series/simd.hpp"
 
 namespace isac::explain {
@@ -97,6 +99,37 @@ void take_out(const Eigen::MatrixXd& basis, Eigen::MatrixXd& x) {
   for (Eigen::Index from = 0; from < x.rows(); from += kRowsAtOnce)
     subtract_block(basis.data() + from, x.data() + from, x.rows(), std::min(kRowsAtOnce, x.rows() - from),
                    basis.cols(), x.cols(), products.data());
+}
+
+Eigen::VectorXd with_share_of_fit(const Eigen::MatrixXd& basis, const Eigen::VectorXd& residual,
+                                  const std::vector<Eigen::Index>& block_of_row, Eigen::Index blocks) {
+  constexpr double kAlone = 0.99;  // of a direction: hardly anything but that block tells of it
+  const Eigen::Index parameters = basis.cols();
+  std::vector<Eigen::MatrixXd> gram(static_cast<std::size_t>(blocks),
+                                    Eigen::MatrixXd::Zero(parameters, parameters));
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(parameters, blocks);
+  for (Eigen::Index i = 0; i < residual.size(); ++i) {
+    const Eigen::Index b = block_of_row[static_cast<std::size_t>(i)];
+    for (Eigen::Index p = 0; p < parameters; ++p) {
+      product(p, b) += basis(i, p) * residual[i];
+      for (Eigen::Index q = 0; q <= p; ++q)
+        gram[static_cast<std::size_t>(b)](p, q) += basis(i, p) * basis(i, q);
+    }
+  }
+  // (1 − B Bᵀ)^(−½) − 1 = B V diag(((1 − λ)^(−½) − 1)/λ) Vᵀ Bᵀ,  BᵀB = V diag(λ) Vᵀ
+  for (Eigen::Index b = 0; b < blocks; ++b) {
+    const estimate::SymmetricEigen of = estimate::symmetric_eigen(gram[static_cast<std::size_t>(b)]);
+    Eigen::VectorXd more = of.vectors.transpose() * product.col(b);
+    for (Eigen::Index p = 0; p < parameters; ++p) {
+      const double share = std::clamp(of.values[p], 0.0, 1.0), root = std::sqrt(1 - share);
+      more[p] *= share < kAlone ? 1 / (root * (1 + root)) : 0.0;
+    }
+    product.col(b) = of.vectors * more;
+  }
+  Eigen::VectorXd scaled = residual;
+  for (Eigen::Index i = 0; i < residual.size(); ++i)
+    scaled[i] += basis.row(i).dot(product.col(block_of_row[static_cast<std::size_t>(i)]));
+  return scaled;
 }
 
 }  // namespace isac::explain

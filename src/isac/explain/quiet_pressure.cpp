@@ -1,6 +1,7 @@
 #include "isac/explain/quiet_pressure.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <vector>
@@ -70,6 +71,35 @@ Eigen::VectorXd solve_significant(const Eigen::MatrixXd& x, const Eigen::VectorX
   return norm.cwiseInverse().asDiagonal() * all;
 }
 
+/// Sums over one valve's rows, and block by block, of s = ∂p̂/∂T_C, p̂ (to which ∂p̂/∂K_C is alike) and e = p − p̂.
+struct ScoresOfLag {
+  double ss = 0, sp = 0, pp = 0;
+  std::vector<std::array<double, 2>> of_block = {};  // Σ s e, Σ p̂ e
+
+  void add(std::size_t block, double s, double p, double e) {
+    ss += s * s;
+    sp += s * p;
+    pp += p * p;
+    if (of_block.size() <= block) of_block.resize(block + 1, {});
+    of_block[block][0] += s * e;
+    of_block[block][1] += p * e;
+  }
+};
+
+/// Of the lag that both valves share, beside the gain that they share, by the scatter of blocks about what the fit leaves, s.
+double deviation_of_lag(const ScoresOfLag (&valves)[2]) {
+  double ss = 0, sp = 0, pp = 0, squares = 0;
+  for (const ScoresOfLag& v : valves) ss += v.ss, sp += v.sp, pp += v.pp;
+  if (!(pp > 0)) return 0;
+  const double share = sp / pp, norm2 = ss - share * sp;
+  for (const ScoresOfLag& v : valves)
+    for (const auto& block : v.of_block) {
+      const double score = block[0] - share * block[1];
+      squares += score * score;
+    }
+  return norm2 > 0 ? std::sqrt(squares) / norm2 : 0.0;
+}
+
 /// What a valve's pressure may depend on by rule, at one sample; pressures in kg/cm².
 class Rules {
  public:
@@ -115,7 +145,38 @@ class Rules {
 struct QuietPressure::Parts {
   std::vector<double> by_rule[2];       ///< p̂ + G, low-passed; empty where the run has no commands
   std::vector<double> rest[2][kBands];  ///< r, by bands
+  std::vector<double> by_lag[kBands];   ///< of (p2 − p1)/2 what p̂ gains by a second of lag, by bands
 };
+
+namespace {
+
+/// x, low-passed as a reading is, in three bands.
+void cut_into_bands(const std::vector<double>& x, double sigma, double interval,
+                    std::vector<double> (&bands)[QuietPressure::kBands]) {
+  const std::vector<double> narrow = low_pass(x, sigma), middle = wide_low_pass(x, kBetween / interval);
+  bands[2] = wide_low_pass(x, kSlow / interval);
+  for (int b = 0; b < 2; ++b) bands[b].resize(x.size());
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    bands[0][k] = narrow[k] - middle[k];
+    bands[1][k] = middle[k] - bands[2][k];
+  }
+}
+
+/// Of the valves' first-order lag, what a second more of it makes of their pressures.
+struct ByLag {
+  ModelPoint longer;
+  double more = 0;  // s
+  explicit ByLag(const ModelPoint& model) : longer(model), more(0.01 * model.base.back()) {
+    longer.base.back() += more;
+  }
+};
+
+/// How far a run is from its beginning, where p(0) is still felt: 0 to 1.
+double known_at(double time) {
+  return std::clamp((time / kSettled - 1) / 0.5, 0.0, 1.0);
+}
+
+}  // namespace
 
 std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data, int threads) const {
   std::vector<Parts> all(data.runs.size());
@@ -123,6 +184,7 @@ std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data, 
   ModelPoint model = model_;
   model.base.resize(predictor.base().size());
   const double lag = model_.base.back();
+  const ByLag by_lag(model);
   share_work(threads, data.runs.size(), [&](std::size_t r) {
     const PreparedRun& run = data.runs[r];
     if (!run.has_command) return;
@@ -146,21 +208,28 @@ std::vector<QuietPressure::Parts> QuietPressure::parts_of(const Prepared& data, 
         ruled[k] += mean;
         rest[k] -= mean;
         // The rough lag does not know where the run began.
-        const double known = std::clamp((run.time[k] / kSettled - 1) / 0.5, 0.0, 1.0);
+        const double known = known_at(run.time[k]);
         ruled[k] += (1 - known) * rest[k];
         rest[k] *= known;
       }
-      const std::vector<double> narrow = low_pass(rest, sigma),
-                                middle = wide_low_pass(rest, kBetween / run.interval),
-                                slow = wide_low_pass(rest, kSlow / run.interval);
       all[r].by_rule[i] = low_pass(ruled, sigma);
-      for (auto& band : all[r].rest[i]) band.resize(rest.size());
-      for (std::size_t k = 0; k < rest.size(); ++k) {
-        all[r].rest[i][0][k] = narrow[k] - middle[k];
-        all[r].rest[i][1][k] = middle[k] - slow[k];
-        all[r].rest[i][2][k] = slow[k];
-      }
+      cut_into_bands(rest, sigma, run.interval, all[r].rest[i]);
     }
+    // A run's mean and its beginning stand as they were read, whatever the lag.
+    const Predictor::FullRate longer = predictor.full_rate(by_lag.longer, r);
+    std::vector<double> gained(run.time.size());
+    double mean = 0, settled = 0;
+    for (std::size_t k = 0; k < gained.size(); ++k) {
+      gained[k] =
+          0.5 * (longer.pressure[1][k] - rate.pressure[1][k] - longer.pressure[0][k] + rate.pressure[0][k]) /
+          by_lag.more;
+      if (run.time[k] < 2 * kSettled) continue;
+      mean += gained[k];
+      settled += 1;
+    }
+    mean /= std::max(1.0, settled);
+    for (std::size_t k = 0; k < gained.size(); ++k) gained[k] = known_at(run.time[k]) * (gained[k] - mean);
+    cut_into_bands(gained, sigma, run.interval, all[r].by_lag);
   });
   return all;
 }
@@ -180,6 +249,8 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
     quiet.model_.rest.clear();
     pressure_gain = fit.model.base[1];
     const double lag = fit.model.base.back();
+    const ByLag by_lag(quiet.model_);
+    ScoresOfLag scores[2];
     bool learnt[2] = {false, false};
     share_work(threads, 2, [&](std::size_t valve) {
       const auto i = static_cast<int>(valve);
@@ -194,7 +265,9 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
         const Rules rules(run, rate.pressure, lag, i);
         // Low-passed as the reading is: of a first-order lag, a Gaussian makes σ²/(2 T²) of what is still to come.
         const std::vector<double> predicted =
-            low_pass(rate.pressure[i], data.smoothing.torque / run.interval);
+                                      low_pass(rate.pressure[i], data.smoothing.torque / run.interval),
+                                  longer = low_pass(predictor.full_rate(by_lag.longer, r).pressure[i],
+                                                    data.smoothing.torque / run.interval);
         for (std::size_t k = 0; k < run.time.size(); k += kStride)
           if (run.usable[k] != 0 && run.time[k] > kSettled) {
             rows.push_back(rules.at(k));
@@ -206,6 +279,8 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
             last_run = r;
             last_time = time;
             off.push_back((run.smooth_pressure[i][k] - predicted[k]) / kPascalPerKgfCm2);
+            scores[i].add(block.back(), (longer[k] - predicted[k]) / (by_lag.more * kPascalPerKgfCm2),
+                          predicted[k] / kPascalPerKgfCm2, off.back());
           }
       }
       if (rows.size() < 20 * kFunctions) return;
@@ -216,6 +291,7 @@ QuietPressure QuietPressure::learn(Prepared& data, const ModelPoint* known, int 
       learnt[i] = quiet.by_rule_[i].allFinite();
     });
     if (!learnt[0] || !learnt[1]) return quiet;
+    quiet.lag_error_ = deviation_of_lag(scores);
   }
   const std::vector<Parts> parts = quiet.parts_of(data, threads);
   const std::vector<PreparedRun> read = data.runs;  // should the torque tell nothing
@@ -293,9 +369,15 @@ void QuietPressure::apply(Prepared& data, const std::vector<Parts>& parts) const
         for (std::size_t b = 0; b < kBands; ++b) p[k] += felt_[b] * part.rest[i][b][k];
       }
     }
-  for (std::size_t r = 0; r < data.runs.size(); ++r)
-    data.runs[r].mean_pressure_error =
-        parts[r].by_rule[0].empty() ? 0.0 : error_of_mean(parts[r], data.runs[r]);
+  for (std::size_t r = 0; r < data.runs.size(); ++r) {
+    PreparedRun& run = data.runs[r];
+    const bool changed = !parts[r].by_rule[0].empty();
+    run.mean_pressure_error = changed ? error_of_mean(parts[r], run) : 0.0;
+    run.lag_pressure_error.assign(changed ? run.time.size() : 0, 0.0);
+    for (std::size_t k = 0; k < run.lag_pressure_error.size(); ++k)
+      for (std::size_t b = 0; b < kBands; ++b)
+        run.lag_pressure_error[k] += lag_error_ * (1 - felt_[b]) * parts[r].by_lag[b][k];
+  }
 }
 
 /// Of what was taken out, a run's mean stays in: as uncertain as blocks of it say.

@@ -8,7 +8,11 @@
 /// that a valve or a sensor does by rule; r: what remains, in three bands (faster than 0.15 s, slower than 1 s, between). A band that the
 /// torque follows is pressure (λ = 1), one that it does not follow is the sensor's noise (λ = 0), which would enter the torque with
 /// B r as large as the force's own. A run's mean of r stays in, for G may be off where nothing was fitted; its error, which no scatter within the
-/// run shows, is PreparedRun::mean_pressure_error. Where the torque cannot tell, the reading stands as it is (prior of λ: 1 ± 0.5).
+/// run shows, is PreparedRun::mean_pressure_error. Nor does any show that of the valves' fitted lag, with which p̂ is off in all runs alike:
+///
+///   PreparedRun::lag_pressure_error = Σ_b (1 − λ_b) [δT_C ∂p̂/∂T_C]_b of (p2 − p1)/2,   δT_C = √Σ_blocks (Σ s e)²/Σ s²,  s = ∂p̂/∂T_C beside ∂p̂/∂K_C
+///
+/// Where the torque cannot tell, the reading stands as it is (prior of λ: 1 ± 0.5).
 /// Units: SI. Threads: values. Errors: none; without commands or torque nothing is changed.
 /// Source: docs/derivations/explain.md; errors in variables: Fuller, Measurement Error Models, 1987, 1.2.
 #pragma once
@@ -41,6 +45,7 @@ class QuietPressure {
   ModelPoint model_;            ///< of the rough fit: K_C, T_C
   Eigen::VectorXd by_rule_[2];  ///< coefficients of G
   std::array<double, kBands> felt_{1, 1, 1};
+  double lag_error_ = 0;  ///< s, one deviation of T_C
   bool known_ = false;
 };
 

@@ -138,7 +138,8 @@ class Screening {
         generic_(data_),
         kept_(kept),
         stretches_(stretches_of(data_)),
-        error_of_means_(error_of_means(place)) {}
+        noise_(noise_of(place)),
+        errors_(errors_of_reading(place)) {}
 
   std::size_t functions() const { return generic_.size(); }
 
@@ -218,6 +219,15 @@ class Screening {
  private:
   Eigen::Index rows() const { return static_cast<Eigen::Index>(data_.rows.size()); }
 
+  static Eigen::VectorXd noise_of(const Around& place) {
+    const Prepared& data = place.predictor->data();
+    std::vector<Eigen::Index> block_of_row;
+    block_of_row.reserve(data.rows.size());
+    for (const Row& row : data.rows) block_of_row.push_back(static_cast<Eigen::Index>(row.block));
+    return with_share_of_fit(place.basis, place.residual, block_of_row,
+                             static_cast<Eigen::Index>(data.blocks));
+  }
+
   /// Weighted responses to every way, side by side.
   Eigen::MatrixXd rows_of(const Hypothesis& h, int hypothesis, std::size_t part,
                           const std::vector<std::vector<Values>>& ways, Eigen::Index columns) const {
@@ -261,7 +271,9 @@ class Screening {
     column.raw_norm2 = raw_norm2;
     column.atom_score = Eigen::VectorXd::Zero(atoms);
     column.atom_norm = Eigen::VectorXd::Zero(atoms);
-    column.run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data_.runs.size()));
+    column.atom_noise = Eigen::VectorXd::Zero(atoms);
+    const auto runs = static_cast<Eigen::Index>(data_.runs.size());
+    column.shared_error = Eigen::VectorXd::Zero(runs + 1);
     double held_by_runs = 0, sum = 0;
     Eigen::Index count = 0;
     for (const Stretch& s : stretches_) {
@@ -269,10 +281,13 @@ class Screening {
       const double norm2 = part.squaredNorm();
       // Prediction − measured: an effect that is missing has the other sign.
       column.atom_score[s.atom] -= part.dot(place_.residual.segment(s.from, s.rows));
+      column.atom_noise[s.atom] -= part.dot(noise_.segment(s.from, s.rows));
       column.atom_norm[s.atom] += norm2;
       column.chain_norm2[s.chain] += norm2;
-      if (s.chain == static_cast<int>(Chain::kTorque))
-        column.run_error[s.run] += part.dot(error_of_means_.segment(s.from, s.rows));
+      if (s.chain == static_cast<int>(Chain::kTorque)) {
+        column.shared_error[s.run] += part.dot(errors_.means.segment(s.from, s.rows));
+        column.shared_error[runs] += part.dot(errors_.lag.segment(s.from, s.rows));
+      }
       sum += part.sum();
       count += s.rows;
       if (!s.ends_run) continue;
@@ -291,7 +306,8 @@ class Screening {
     // Half a percent of a response is how its column was low-passed, not what the effect does.
     if (column.norm2 < mimicked * std::max(column.raw_norm2, 1e-300)) {
       column.atom_score.setZero();
-      column.run_error.setZero();
+      column.atom_noise.setZero();
+      column.shared_error.setZero();
       column.norm2 = 0;
     }
     column.score = column.atom_score.sum();
@@ -352,7 +368,8 @@ class Screening {
   const Dictionary generic_;
   Responses* kept_;
   const std::vector<Stretch> stretches_;
-  const Eigen::VectorXd error_of_means_;
+  const Eigen::VectorXd noise_;  ///< r′
+  const ErrorsOfReading errors_;
 };
 
 }  // namespace

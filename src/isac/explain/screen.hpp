@@ -3,7 +3,8 @@
 ///
 ///   x⊥ = x − S (SᵀS)⁻¹ Sᵀ x      response of an effect, less what a change of the fitted parameters does as well
 ///   g_b = Σ_{i∈b} x⊥_i r_i       score of block b
-///   T = |Σ g_b| / √(Σ g_b²)      and the largest T over all responses, its p-value by flipping the signs of whole blocks
+///   n_b = Σ_{i∈b} x⊥_i r′_i      and with what the fit has taken of its noise (projection.hpp)
+///   T = |Σ g_b| / √(Σ n_b²)      and the largest T over all responses, its p-value by flipping the signs of whole blocks
 ///
 /// A flip leaves the distribution of noise as it is, however it is coloured within a block; no noise model enters.
 /// T cannot pass the square root of the blocks that carry an effect, because those blocks are their own yardstick. Where they are few
@@ -13,7 +14,8 @@
 /// between runs by its runs alone: where those scatter more than their blocks do, T is Student's of the runs' scatter, as a normal's. Scatter
 /// is of what is left beside the column, and beside tolerances that were held at a bound against it: they come back.
 /// Where a pressure sensor's noise was taken out of the torque but for each run's mean (quiet_pressure.hpp), the error of that mean is the same
-/// in all blocks of its run: e_r = Σ_{i∈r} x⊥_i · B r δp_r is one block more, with nothing in Σ g_b: T = |Σ g_b|/√(Σ g_b² + Σ e_r²).
+/// in all blocks of its run: e_r = Σ_{i∈r} x⊥_i · B r δp_r is one block more, with nothing in Σ g_b: T = |Σ g_b|/√(Σ n_b² + Σ e_r²). So is that
+/// of the valves' lag, by which the noise is known, in all runs.
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
@@ -47,9 +49,14 @@ struct Column {
   std::string name;                       ///< of a dictionary column
   Chain chain = Chain::kTorque;           ///< of a dictionary column
   Eigen::VectorXd atom_score, atom_norm;  ///< of the shortest blocks: Σ x⊥ r, Σ x⊥²
-  Eigen::VectorXd atom_left;  ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
   Eigen::VectorXd
-      run_error;  ///< what the error of each run's mean pressure makes of its score, one deviation
+      atom_noise;  ///< Σ x⊥ r′, which scatters as noise does (projection.hpp); empty: as atom_score
+  Eigen::VectorXd atom_left;  ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
+  /// What an error of one deviation makes of its score: of each run's mean pressure, and of the valves' lag.
+  Eigen::VectorXd shared_error;
+  [[nodiscard]] const Eigen::VectorXd& noise() const noexcept {
+    return atom_noise.size() > 0 ? atom_noise : atom_score;
+  }
   double score = 0, norm2 = 0;       ///< Σ g_b, Σ x⊥²
   double raw_norm2 = 0;              ///< Σ x²: what was there before the projection
   double chain_norm2[kChains] = {};  ///< Σ x⊥² of each chain
@@ -137,17 +144,21 @@ struct Yardstick {
 /// `residual`: of the hypothesis' refit; `place`: what it started from; `kept` holds the functions.
 [[nodiscard]] Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept,
                                          int hypothesis, const Eigen::VectorXd& residual);
-/// Weighted torque that an error of one deviation in a run's mean pressure makes, all runs side by side.
-[[nodiscard]] Eigen::VectorXd error_of_means(const Around& place);
+/// Weighted torque that an error of one deviation makes of what a pressure's noise was taken out by (quiet_pressure.hpp): of each run's mean, all
+/// runs side by side, and of the valves' lag.
+struct ErrorsOfReading {
+  Eigen::VectorXd means, lag;
+};
+[[nodiscard]] ErrorsOfReading errors_of_reading(const Around& place);
 /// p-value of what one refit closes, by the scatter of what it leaves. With δ = before − after, n_b = Σ_b δ², l_b = Σ_b after·δ:
 ///
 ///   t = (Σ n_b + Σ l_b)/√Σ (l_b/(1 − h_b))²,  h_b = n_b/Σ n,  with as many degrees of freedom as blocks carry δ, less one;
-///   whole runs instead of blocks, where those scatter more; `error_of_means` of each run adds (Σ_run δ e)² to the scatter's square
+///   whole runs instead of blocks, where those scatter more; `errors` add (Σ δ e)² to the scatter's square, of means each run by itself
 ///
 /// A column by itself takes for scatter what an effect's other amplitudes make of it: an unbalanced mass of 270 sigma, m g l sin(φ + φ₀) of free
 /// runs only, had p = 0.04.
 [[nodiscard]] double p_of_refit(const Prepared& data, const Eigen::VectorXd& before,
-                                const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means = {});
+                                const Eigen::VectorXd& after, const ErrorsOfReading& errors = {});
 /// p-value of what one refit closes in blocks so few that the noise's variance is taken from elsewhere, V = unit Σ n_b. With W = Σ (l_b/(1 − h_b))²,
 /// which ν_W tell: the noise may be louder in these very blocks, or of another colour, W > V. Two blocks speak for its being as elsewhere:
 ///
@@ -157,7 +168,7 @@ struct Yardstick {
 /// Of 500 days without an effect in a recorded noise 24 had p ≤ 0.01 by V alone, seven of ten a compliance near 9 Hz, where few decays of the free
 /// joint were a hundred times as loud as the middle of the day.
 [[nodiscard]] double p_in_its_blocks(const Prepared& data, const Eigen::VectorXd& before,
-                                     const Eigen::VectorXd& after, const Eigen::VectorXd& error_of_means,
+                                     const Eigen::VectorXd& after, const ErrorsOfReading& errors,
                                      const Elsewhere& elsewhere);
 /// The tests once more, after the blocks were cut anew, or with another yardstick for one hypothesis.
 void judge(Screen& screen, const Prepared& data, const Library& library, const ScreenOptions& options,

@@ -119,10 +119,10 @@ void Search::hold_rare_against_their_blocks(Screen& s, Yardstick yardstick) {
   }
   if (rare.empty()) return;
   const std::vector<Trial> trials = refit_all(rare);
-  const Eigen::VectorXd means = error_of_means(place_);
+  const ErrorsOfReading errors = errors_of_reading(place_);
   for (std::size_t i = 0; i < rare.size(); ++i) {
     yardstick.least_p[rare[i].hypothesis] =
-        p_in_its_blocks(data_, place_.residual, left_as_known_beforehand(trials[i]), means, elsewhere[i]);
+        p_in_its_blocks(data_, place_.residual, left_as_known_beforehand(trials[i]), errors, elsewhere[i]);
     const bool known = std::any_of(refitted_here_.begin(), refitted_here_.end(), [&](const RefittedHere& r) {
       return r.trial.hypothesis == rare[i].hypothesis && r.start == rare[i].start;
     });
