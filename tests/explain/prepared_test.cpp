@@ -52,8 +52,12 @@ TEST(SlowTurns, of_a_led_joint_do_not_count_in_the_torque) {
   EXPECT_NEAR(data.untold() / 20.0, 0.5, 0.15);
   for (std::size_t k = 500; k < 9500; ++k) {
     const double at = std::fmod(run.time[k], 1.6);
-    if (at > 0.3 && at < 0.7) EXPECT_EQ(run.loaded[k], 1) << run.time[k] << " s, in the middle of a stroke";
-    if (at > 1.1 && at < 1.5) EXPECT_EQ(run.loaded[k], 0) << run.time[k] << " s, in a pause";
+    if (at > 0.3 && at < 0.7) {
+      EXPECT_EQ(run.loaded[k], 1) << run.time[k] << " s, in the middle of a stroke";
+    }
+    if (at > 1.1 && at < 1.5) {
+      EXPECT_EQ(run.loaded[k], 0) << run.time[k] << " s, in a pause";
+    }
   }
   EXPECT_EQ(std::count(run.usable.begin() + 500, run.usable.begin() + 9500, 0), 0)
       << "pressures are read as ever";

@@ -94,9 +94,9 @@ TEST_F(Calibrate, recovers_every_gain_and_zero_of_a_rig_and_then_its_joint) {
   EXPECT_NEAR(calibrated["B"]["value"].get<double>() / 174.2, 1, 5e-3);
   const auto plain = joint_with(folder_ / "rig.toml", "plain");
   // What gains off by up to 3 % and a zero off by up to 18 degrees do: at least four times the tolerance above, or a refusal.
-  const auto off = [&plain](const char* name, double truth) {
+  const auto off = [&plain](const char* name, double expected) {
     const auto& value = plain[name]["value"];
-    return value.is_null() ? 1.0 : std::abs(value.get<double>() / truth - 1);
+    return value.is_null() ? 1.0 : std::abs(value.get<double>() / expected - 1);
   };
   EXPECT_GT(std::max(off("A", -23450.0), off("B", 174.2)), 0.02) << plain.dump(1);
 }
