@@ -1,5 +1,6 @@
 #include "isac/explain/prepared.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -140,6 +141,47 @@ void leave_out_slow_turns(PreparedRun& run, double angle_step) {
   run.untold = static_cast<double>(untold.size()) * run.interval;
 }
 
+/// Weights of samples 0 … m that make the slope at the first of the parabola through them, per sample.
+Eigen::VectorXd slope_at_first(Eigen::Index m) {
+  Eigen::MatrixX3d powers(m + 1, 3);
+  for (Eigen::Index i = 0; i <= m; ++i) {
+    const auto x = static_cast<double>(i);
+    powers.row(i) << 1, x, x * x;
+  }
+  return powers * Eigen::Matrix3d(powers.transpose() * powers).inverse().col(1);
+}
+
+/// The torque, of which sums of samples by a kernel are its integral. Where a command jumps the torque's slope jumps, by J, and
+/// Σ g T Δt = ∫ g T dt − J Δt²/12 g (Euler and Maclaurin), while g″ ∗ φ of the angle, whose third derivative jumps, is exact: of the accelerations
+/// of an unhurried day 2e-4, which a lighter joint would have as well. J is read off 40 ms on both sides.
+std::vector<double> as_it_bends(const PreparedRun& run) {
+  constexpr double kJump =
+      0.1 * kPascalPerKgfCm2;     // what is less bends less than a hundredth of a row's noise
+  constexpr double kSide = 0.04;  // s
+  std::vector<double> torque = run.torque;
+  if (!run.has_command) return torque;
+  const std::size_t n = torque.size();
+  std::vector<std::size_t> jumps;
+  for (std::size_t k = 1; k < n; ++k)
+    if (std::max(std::abs(run.command[0][k] - run.command[0][k - 1]),
+                 std::abs(run.command[1][k] - run.command[1][k - 1])) >= kJump)
+      jumps.push_back(k);
+  const auto side = static_cast<std::size_t>(std::max(5.0, std::round(kSide / run.interval)));
+  const Eigen::VectorXd slope = slope_at_first(static_cast<Eigen::Index>(side));
+  for (std::size_t j = 0; j < jumps.size(); ++j) {
+    const std::size_t k = jumps[j];
+    // What bends twice is not read.
+    if (k < side || k + side >= n || (j > 0 && k - jumps[j - 1] <= side) ||
+        (j + 1 < jumps.size() && jumps[j + 1] - k <= side))
+      continue;
+    double bend = 0;  // J Δt
+    for (std::size_t i = 0; i <= side; ++i)
+      bend += slope[static_cast<Eigen::Index>(i)] * (run.torque[k + i] + run.torque[k - i]);
+    torque[k] += bend / 12;
+  }
+  return torque;
+}
+
 PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
                         const BaselineModel& baseline, const Smoothing& smoothing) {
   PreparedRun run;
@@ -226,7 +268,7 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     };
     undo_lag(run.smooth_torque, sigma);
     if (run.is_free) {
-      run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
+      run.slow_torque = low_pass(as_it_bends(run), smoothing.motion / dt);
       undo_lag(run.slow_torque, smoothing.motion / dt);
       run.slow_acceleration = quiet_acceleration(run.raw_angle, smoothing.motion / dt, dt, rig.angle_step);
       run.swing = quiet_motion(run.raw_angle, sigma, dt, rig.angle_step);
@@ -254,25 +296,6 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
   return run;
 }
 
-/// 1 beside a command that jumps: the torque bends there, and the mean of its samples by the kernel is not that of what lies between them. Where a
-/// slope changes by J at a sample, Σ g T Δt = ∫ g T dt − J Δt²/12 g (Euler and Maclaurin), while g″ ∗ φ of the angle, whose third derivative
-/// jumps, is exact: of the accelerations of an unhurried day 2e-4, which a lighter joint would have as well.
-std::vector<unsigned char> beside_jumps(const PreparedRun& run, double kernel_seconds) {
-  constexpr double kJump =
-      0.1 * kPascalPerKgfCm2;  // within a sample; what is less bends less than a hundredth of the rows' noise
-  constexpr double kReach = 3;  // deviations of the kernel
-  const std::size_t n = run.time.size(),
-                    reach = static_cast<std::size_t>(std::ceil(kReach * kernel_seconds / run.interval));
-  std::vector<unsigned char> beside(n, 0);
-  if (!run.has_command) return beside;
-  for (const std::vector<double>& command : run.command)
-    for (std::size_t k = 1; k < std::min(n, command.size()); ++k)
-      if (std::abs(command[k] - command[k - 1]) >= kJump)
-        std::fill(beside.begin() + static_cast<std::ptrdiff_t>(k - std::min(k, reach)),
-                  beside.begin() + static_cast<std::ptrdiff_t>(std::min(n, k + reach + 1)), 1);
-  return beside;
-}
-
 void add_rows(Prepared& data) {
   data.rows.clear();
   data.run_begin.assign(1, 0);
@@ -295,13 +318,10 @@ void add_rows(Prepared& data) {
           chain == Chain::kTorque || chain == Chain::kMotion ? run.loaded : run.usable;
       const bool moving_only =
           chain == Chain::kMotion || (chain == Chain::kTorque && run.is_free && data.with_free_torque);
-      const std::vector<unsigned char> bends =
-          chain == Chain::kMotion ? beside_jumps(run, data.smoothing.motion) : std::vector<unsigned char>();
       for (std::size_t k = 0; k < run.time.size(); k += step)
         // A joint that rests is held by any friction it has: its balance tells nothing there. And it rests anywhere within a step of
         // the encoder, as far off in torque as a zero wanders.
-        if (fit[k] != 0 && run.time[k] >= skip && (!moving_only || run.dry_velocity[k] != 0) &&
-            (bends.empty() || bends[k] == 0))
+        if (fit[k] != 0 && run.time[k] >= skip && (!moving_only || run.dry_velocity[k] != 0))
           data.rows.push_back({.run = static_cast<unsigned>(r),
                                .sample = static_cast<unsigned>(k),
                                .atom = 0,
