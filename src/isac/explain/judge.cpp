@@ -175,17 +175,22 @@ FlipTest flip_test(const Eigen::MatrixXd& scores, int flips, std::uint64_t seed,
 ErrorsOfReading errors_of_reading(const Around& place) {
   const Prepared& data = place.predictor->data();
   const auto rows = static_cast<Eigen::Index>(data.rows.size());
-  ErrorsOfReading errors{.means = Eigen::VectorXd::Zero(rows), .lag = Eigen::VectorXd::Zero(rows)};
+  ErrorsOfReading errors;
+  Eigen::VectorXd& of_lag = errors.of_day[0];
+  Eigen::VectorXd& of_bends = errors.of_day[1];
+  errors.of_run = of_lag = of_bends = Eigen::VectorXd::Zero(rows);
   const double gain = place.predictor->pressure_gain(place.fit->model);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Row& row = data.rows[static_cast<std::size_t>(i)];
     const PreparedRun& run = data.runs[row.run];
+    if (row.chain == Chain::kMotion && !run.slow_torque_error.empty())
+      of_bends[i] = run.slow_torque_error[row.sample];
     if (row.chain != Chain::kTorque) continue;
-    errors.means[i] = gain * run.mean_pressure_error;
-    if (!run.lag_pressure_error.empty()) errors.lag[i] = gain * run.lag_pressure_error[row.sample];
+    errors.of_run[i] = gain * run.mean_pressure_error;
+    if (!run.lag_pressure_error.empty()) of_lag[i] = gain * run.lag_pressure_error[row.sample];
   }
-  for (Eigen::VectorXd* torque : {&errors.means, &errors.lag})
-    if (torque->squaredNorm() > 0) weigh(data, *place.weights, *torque);
+  for (Eigen::VectorXd* error : {&errors.of_run, &of_lag, &of_bends})
+    if (error->squaredNorm() > 0) weigh(data, *place.weights, *error);
   return errors;
 }
 
@@ -231,20 +236,20 @@ std::optional<Closed> closed_by(const Prepared& data, const Eigen::VectorXd& bef
   c.left = c.norm2 = Eigen::VectorXd::Zero(blocks);
   c.run_of_block.assign(data.blocks, 0);
   Eigen::VectorXd run_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(data.runs.size()));
-  double lag_error = 0;
+  Eigen::Vector<double, ErrorsOfReading::kOfDay> day_error = {0, 0};
   for (std::size_t i = 0; i < data.rows.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i), block = static_cast<Eigen::Index>(data.rows[i].block);
     const double closed = before[row] - after[row];
     c.norm2[block] += closed * closed;
     c.left[block] += after[row] * closed;
     c.run_of_block[data.rows[i].block] = static_cast<Eigen::Index>(data.rows[i].run);
-    if (errors.means.size() == 0) continue;
-    run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * errors.means[row];
-    lag_error += closed * errors.lag[row];
+    if (errors.of_run.size() == 0) continue;
+    run_error[static_cast<Eigen::Index>(data.rows[i].run)] += closed * errors.of_run[row];
+    for (Eigen::Index e = 0; e < day_error.size(); ++e) day_error[e] += closed * errors.of_day[e][row];
   }
   if (!(c.norm2.sum() > 0)) return std::nullopt;
   c.score = c.norm2.sum() + c.left.sum();
-  c.shared_error2 = run_error.squaredNorm() + lag_error * lag_error;
+  c.shared_error2 = run_error.squaredNorm() + day_error.squaredNorm();
   c.own = jackknife(c.left, c.norm2);
   return c;
 }

@@ -41,7 +41,9 @@ struct SomeRuns {
   }
 
   /// Of the blocks, and what the errors that runs and the day share make of it.
-  Eigen::Index scores() const { return static_cast<Eigen::Index>(data.blocks + data.runs.size()) + 1; }
+  Eigen::Index scores() const {
+    return static_cast<Eigen::Index>(data.blocks + data.runs.size()) + ErrorsOfReading::kOfDay;
+  }
   Eigen::VectorXd scores_of(std::size_t function) const {
     const Column& c = *functions[function];
     Eigen::VectorXd scores_of_blocks = Eigen::VectorXd::Zero(scores());

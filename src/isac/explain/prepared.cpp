@@ -151,16 +151,12 @@ Eigen::VectorXd slope_at_first(Eigen::Index m) {
   return powers * Eigen::Matrix3d(powers.transpose() * powers).inverse().col(1);
 }
 
-/// The torque, of which sums of samples by a kernel are its integral. Where a command jumps the torque's slope jumps, by J, and
-/// Σ g T Δt = ∫ g T dt − J Δt²/12 g (Euler and Maclaurin), while g″ ∗ φ of the angle, whose third derivative jumps, is exact: of the accelerations
-/// of an unhurried day 2e-4, which a lighter joint would have as well. J is read off 40 ms on both sides.
-std::vector<double> as_it_bends(const PreparedRun& run) {
+/// J Δt/12 at samples at which a command jumps, of a torque whose slope jumps by J there; J is read off 40 ms on both sides.
+std::vector<double> bends_of(const PreparedRun& run) {
   constexpr double kJump =
       0.1 * kPascalPerKgfCm2;     // what is less bends less than a hundredth of a row's noise
   constexpr double kSide = 0.04;  // s
-  std::vector<double> torque = run.torque;
-  if (!run.has_command) return torque;
-  const std::size_t n = torque.size();
+  const std::size_t n = run.torque.size();
   std::vector<std::size_t> jumps;
   for (std::size_t k = 1; k < n; ++k)
     if (std::max(std::abs(run.command[0][k] - run.command[0][k - 1]),
@@ -168,18 +164,17 @@ std::vector<double> as_it_bends(const PreparedRun& run) {
       jumps.push_back(k);
   const auto side = static_cast<std::size_t>(std::max(5.0, std::round(kSide / run.interval)));
   const Eigen::VectorXd slope = slope_at_first(static_cast<Eigen::Index>(side));
+  std::vector<double> bends(n, 0.0);
   for (std::size_t j = 0; j < jumps.size(); ++j) {
     const std::size_t k = jumps[j];
     // What bends twice is not read.
     if (k < side || k + side >= n || (j > 0 && k - jumps[j - 1] <= side) ||
         (j + 1 < jumps.size() && jumps[j + 1] - k <= side))
       continue;
-    double bend = 0;  // J Δt
     for (std::size_t i = 0; i <= side; ++i)
-      bend += slope[static_cast<Eigen::Index>(i)] * (run.torque[k + i] + run.torque[k - i]);
-    torque[k] += bend / 12;
+      bends[k] += slope[static_cast<Eigen::Index>(i)] * (run.torque[k + i] + run.torque[k - i]) / 12;
   }
-  return torque;
+  return bends;
 }
 
 PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
@@ -268,10 +263,11 @@ PreparedRun prepare_run(const series::Recording& recording, const RigFacts& rig,
     };
     undo_lag(run.smooth_torque, sigma);
     if (run.is_free) {
-      run.slow_torque = low_pass(as_it_bends(run), smoothing.motion / dt);
+      run.slow_torque = low_pass(run.torque, smoothing.motion / dt);
       undo_lag(run.slow_torque, smoothing.motion / dt);
       run.slow_acceleration = quiet_acceleration(run.raw_angle, smoothing.motion / dt, dt, rig.angle_step);
       run.swing = quiet_motion(run.raw_angle, sigma, dt, rig.angle_step);
+      if (run.has_command) run.slow_torque_error = low_pass(bends_of(run), smoothing.motion / dt);
     }
   }
   // Rows beside gaps and edges see through the kernel what is not there.

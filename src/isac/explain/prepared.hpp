@@ -70,6 +70,10 @@ struct PreparedRun {
   std::vector<double> torque;         ///< N m (or the output's unit) as read
   std::vector<double> smooth_torque;  ///< low-passed for the torque chain
   std::vector<double> slow_torque, slow_acceleration;  ///< low-passed for the motion chain
+  /// By how much slow_torque may be off where a command jumps and the torque's slope with it, by J: a sum of samples by the kernel g is
+  /// Σ g T Δt = ∫ g T dt − J Δt² ½ B₂(x) g, x of a sample after one, ½ B₂ = 1/12 at x = 0 and −1/24 at ½ (Euler and Maclaurin), while g″ ∗ φ of the
+  /// angle, whose third derivative jumps, is exact. J Δt²/12 g, N m; empty where no command is known.
+  std::vector<double> slow_torque_error;
   Motion swing;  ///< of a free joint, for what swings on it (filters.hpp, `quiet_motion`); may be empty
   /// 0 where a force sensor hangs slack, which cannot read a push, and where a led joint's direction is untold.
   std::vector<unsigned char> loaded;

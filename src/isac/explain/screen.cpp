@@ -273,7 +273,7 @@ class Screening {
     column.atom_norm = Eigen::VectorXd::Zero(atoms);
     column.atom_noise = Eigen::VectorXd::Zero(atoms);
     const auto runs = static_cast<Eigen::Index>(data_.runs.size());
-    column.shared_error = Eigen::VectorXd::Zero(runs + 1);
+    column.shared_error = Eigen::VectorXd::Zero(runs + ErrorsOfReading::kOfDay);
     double held_by_runs = 0, sum = 0;
     Eigen::Index count = 0;
     for (const Stretch& s : stretches_) {
@@ -284,10 +284,9 @@ class Screening {
       column.atom_noise[s.atom] -= part.dot(noise_.segment(s.from, s.rows));
       column.atom_norm[s.atom] += norm2;
       column.chain_norm2[s.chain] += norm2;
-      if (s.chain == static_cast<int>(Chain::kTorque)) {
-        column.shared_error[s.run] += part.dot(errors_.means.segment(s.from, s.rows));
-        column.shared_error[runs] += part.dot(errors_.lag.segment(s.from, s.rows));
-      }
+      column.shared_error[s.run] += part.dot(errors_.of_run.segment(s.from, s.rows));
+      for (Eigen::Index e = 0; e < ErrorsOfReading::kOfDay; ++e)
+        column.shared_error[runs + e] += part.dot(errors_.of_day[e].segment(s.from, s.rows));
       sum += part.sum();
       count += s.rows;
       if (!s.ends_run) continue;

@@ -52,7 +52,7 @@ struct Column {
   Eigen::VectorXd
       atom_noise;  ///< Σ x⊥ r′, which scatters as noise does (projection.hpp); empty: as atom_score
   Eigen::VectorXd atom_left;  ///< Σ x⊥ r of what is left beside it, of columns that rest; empty else
-  /// What an error of one deviation makes of its score: of each run's mean pressure, and of the valves' lag.
+  /// What errors of one deviation make of its score: of each run, then of the day (ErrorsOfReading).
   Eigen::VectorXd shared_error;
   [[nodiscard]] const Eigen::VectorXd& noise() const noexcept {
     return atom_noise.size() > 0 ? atom_noise : atom_score;
@@ -144,16 +144,17 @@ struct Yardstick {
 /// `residual`: of the hypothesis' refit; `place`: what it started from; `kept` holds the functions.
 [[nodiscard]] Yardstick yardstick_beside(const Screen& screen, const Around& place, Responses& kept,
                                          int hypothesis, const Eigen::VectorXd& residual);
-/// Weighted torque that an error of one deviation makes of what a pressure's noise was taken out by (quiet_pressure.hpp): of each run's mean, all
-/// runs side by side, and of the valves' lag.
+/// What errors of one deviation make of weighted rows, which no block's scatter shows: in a run's mean pressure, all runs side by side; and in what
+/// the whole day shares, the valves' lag by which a pressure's noise is told (quiet_pressure.hpp) and a torque that bends between its samples.
 struct ErrorsOfReading {
-  Eigen::VectorXd means, lag;
+  static constexpr Eigen::Index kOfDay = 2;
+  Eigen::VectorXd of_run, of_day[kOfDay];
 };
 [[nodiscard]] ErrorsOfReading errors_of_reading(const Around& place);
 /// p-value of what one refit closes, by the scatter of what it leaves. With δ = before − after, n_b = Σ_b δ², l_b = Σ_b after·δ:
 ///
 ///   t = (Σ n_b + Σ l_b)/√Σ (l_b/(1 − h_b))²,  h_b = n_b/Σ n,  with as many degrees of freedom as blocks carry δ, less one;
-///   whole runs instead of blocks, where those scatter more; `errors` add (Σ δ e)² to the scatter's square, of means each run by itself
+///   whole runs instead of blocks, where those scatter more; `errors` add (Σ δ e)² to the scatter's square, of runs each by itself
 ///
 /// A column by itself takes for scatter what an effect's other amplitudes make of it: an unbalanced mass of 270 sigma, m g l sin(φ + φ₀) of free
 /// runs only, had p = 0.04.
