@@ -264,7 +264,12 @@ Step Search::screened_step() {
 
 Step Search::refitted(Step step) {
   const double least = std::max(options_.material, found_.added.empty() ? 0.0 : small_in(step.gate.chain));
-  if (!step.gate.significant || step.gate.size < kWorthALook * least) return step;
+  if (!step.gate.significant) return step;
+  // What shows beside an effect may be small, and made by something large whose shape the blocks do not agree on.
+  const std::vector<Screened>& candidates = step.screen.candidates;
+  const bool large_beside = !found_.added.empty() && !candidates.empty() &&
+                            candidates.front().gain > kLargeForSure * step.screen.noise_unit;
+  if (step.gate.size < kWorthALook * least && !large_beside) return step;
   step.trials = refit_all(shortlist(step.screen));
   std::set<std::string> ignored;
   std::erase_if(step.trials, [&](const Trial& t) {
