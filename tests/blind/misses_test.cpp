@@ -24,6 +24,7 @@ std::string scratch(const std::string& name) {
       .string();
 }
 
+/// `answer`: what the answer says; of two that are right, either|or.
 struct Miss {
   const char *tier, *noise, *effect, *seed, *answer, *was, *day = "drawn";
 };
@@ -51,8 +52,12 @@ TEST_P(Misses, are_answered_rightly) {
   for (std::size_t i = 0; i < line.size(); ++i)
     if (line[i] != '\\' && line[i] != ' ' && !(line[i] == 'n' && i > 0 && line[i - 1] == '\\'))
       answer += line[i];
-  EXPECT_NE(answer.find(miss.answer), std::string::npos) << "it was: " << miss.was << "\n"
-                                                         << line.substr(0, 6000);
+  const std::string right = miss.answer;
+  const std::size_t either = right.find('|');
+  EXPECT_TRUE(answer.find(right.substr(0, either)) != std::string::npos ||
+              (either != std::string::npos && answer.find(right.substr(either + 1)) != std::string::npos))
+      << "it was: " << miss.was << "\n"
+      << line.substr(0, 6000);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -171,7 +176,8 @@ INSTANTIATE_TEST_SUITE_P(
              "a slack muscle, as in white noise"},
         Miss{"leave-one-out", "coloured", "coulomb_friction", "8402", R"("verdict":"not_separable")",
              "Stribeck friction, whose friction at rest was that of sliding within its error"},
-        Miss{"leave-one-out", "coloured", "pressure_sensor_gain", "8103", R"("verdict":"unknown")",
+        Miss{"leave-one-out", "coloured", "pressure_sensor_gain", "8103",
+             R"("verdict":"unknown"|aneffectthatthecataloguedoesnothavecannotberuledout)",
              "unequal muscles with a leak, where a zero of the pressure sensors had nearly done"},
         Miss{"leave-one-out", "coloured", "valve_deadband", "8101", R"("verdict":"unknown")",
              "a spool's stiction, for no lag is like what it left over and slow noise took the rest"},
