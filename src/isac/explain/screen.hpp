@@ -15,7 +15,7 @@
 /// is of what is left beside the column, and beside tolerances that were held at a bound against it: they come back.
 /// Where a pressure sensor's noise was taken out of the torque but for each run's mean (quiet_pressure.hpp), the error of that mean is the same
 /// in all blocks of its run: e_r = Σ_{i∈r} x⊥_i · B r δp_r is one block more, with nothing in Σ g_b: T = |Σ g_b|/√(Σ n_b² + Σ e_r²). So is that
-/// of the valves' lag, by which the noise is known, in all runs.
+/// of the valves' lag, by which the noise is known, and of a torque that bends where commands jump, each in all runs (ErrorsOfReading).
 /// Threads: uses up to `threads`. Deterministic for a given seed. Errors: none.
 /// Source: Hemerik, Goeman and Finos 2020; docs/derivations/explain.md.
 #pragma once
