@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <random>
 #include <stdexcept>
 
@@ -437,6 +438,111 @@ TEST(KeptResponses, are_not_taken_where_what_was_added_changes_them) {
   EXPECT_FALSE(Responses::hold(beside("force_gain_error"), find("force_offset")));
   EXPECT_TRUE(Responses::hold(beside("encoder_offset"), find("cubic_stiffness")));
   EXPECT_FALSE(Responses::hold(beside("encoder_offset"), find("force_offset")));
+}
+
+/// A led joint twice and a free one, whose readings are off by what is set; blocks of two seconds.
+Prepared day_with_errors(const test::TiedRig& rig) {
+  Prepared data = prepare(test::record_all(rig, {test::by_hand(20, 0.35, 0.6), test::by_hand(20, 0.3, 2.0),
+                                                 test::free_in_steps(30, 6, 0.4)}),
+                          rig.facts(), {}, 2.0);
+  for (PreparedRun& run : data.runs) {
+    run.mean_pressure_error = 0;
+    run.lag_pressure_error.clear();
+    run.slow_torque_error.clear();
+  }
+  return data;
+}
+
+TEST(ErrorsOfReading, are_of_the_rows_that_they_enter_in_deviations_of_these) {
+  Prepared data = day_with_errors({});
+  data.runs[0].mean_pressure_error = 200;
+  data.runs[1].lag_pressure_error.assign(data.runs[1].time.size(), 30);
+  data.runs[2].slow_torque_error.assign(data.runs[2].time.size(), 0.001);
+  const Library library = make_library(data);
+  const Predictor predictor(data);
+  const Weights weights{{0.0025, 120, 120, 0.005}, {}, false, {}};
+  const Fit stem = fit_baseline(predictor, library.tolerances, weights);
+  const ErrorsOfReading errors = errors_of_reading(around(predictor, stem, weights));
+  const double gain = predictor.pressure_gain(stem.model);
+  int of[kChains] = {};
+  for (std::size_t i = 0; i < data.rows.size(); ++i) {
+    const Row& row = data.rows[i];
+    const auto k = static_cast<Eigen::Index>(i);
+    const bool torque = row.chain == Chain::kTorque, motion = row.chain == Chain::kMotion;
+    ASSERT_NEAR(errors.of_run[k], torque && row.run == 0 ? gain * 200 / 0.0025 : 0.0, 1e-9);
+    ASSERT_NEAR(errors.of_day[0][k], torque && row.run == 1 ? gain * 30 / 0.0025 : 0.0, 1e-9);
+    ASSERT_NEAR(errors.of_day[1][k], motion && row.run == 2 ? 0.001 / 0.005 : 0.0, 1e-9);
+    ++of[static_cast<int>(row.chain)];
+  }
+  EXPECT_NE(gain, 0);
+  EXPECT_GT(of[static_cast<int>(Chain::kTorque)], 1000);
+  EXPECT_GT(of[static_cast<int>(Chain::kMotion)], 1000);
+}
+
+TEST(ErrorsOfReading, reach_the_scatter_of_every_score_together) {
+  const test::TiedRig rig{.dry = 0.02};
+  const Prepared exact = day_with_errors(rig);
+  Prepared off = exact;
+  // Each by itself, then all three: Σ e² of a column is the sum of theirs.
+  const auto run_off = [&] {
+    off.runs[0].mean_pressure_error = 300;
+    off.runs[1].mean_pressure_error = 100;
+  };
+  const auto lag_off = [&] {
+    for (PreparedRun& run : off.runs) {
+      run.lag_pressure_error.resize(run.time.size());
+      for (std::size_t k = 0; k < run.time.size(); ++k)
+        run.lag_pressure_error[k] = 80 * std::sin(0.8 * run.time[k]);
+    }
+  };
+  const auto bends_off = [&] {
+    off.runs[2].slow_torque_error.resize(off.runs[2].time.size());
+    for (std::size_t k = 0; k < off.runs[2].time.size(); ++k)
+      off.runs[2].slow_torque_error[k] = 0.003 * std::sin(2 * off.runs[2].time[k]);
+  };
+  const Weights weights{{0.0025, 120, 120, 0.005}, {}, false, {}};
+  const Library library = make_library(exact);
+  const Predictor of_exact(exact);
+  const Fit stem = fit_baseline(of_exact, library.tolerances, weights);
+  const auto screened = [&](const Prepared& data) {
+    const Predictor predictor(data);
+    return screen(around(predictor, stem, weights), library, {.flips = 19, .dictionary = true});
+  };
+  const Screen none = screened(exact);
+  std::vector<Screen> alone;
+  for (const std::function<void()>& set :
+       {std::function<void()>(run_off), std::function<void()>(lag_off), std::function<void()>(bends_off)}) {
+    off = exact;
+    set();
+    alone.push_back(screened(off));
+  }
+  off = exact;
+  run_off();
+  lag_off();
+  bends_off();
+  const Screen all = screened(off);
+  ASSERT_EQ(all.columns.size(), none.columns.size());
+  int reached[3] = {}, larger = 0, compared = 0;
+  for (std::size_t k = 0; k < all.columns.size(); ++k) {
+    const Column &c = all.columns[k], &before = none.columns[k];
+    ASSERT_EQ(before.shared_error.squaredNorm(), 0);
+    double sum = 0;
+    for (std::size_t e = 0; e < alone.size(); ++e) {
+      const double error2 = alone[e].columns[k].shared_error.squaredNorm();
+      reached[e] += error2 > 0.01 * c.norm2 ? 1 : 0;
+      sum += error2;
+    }
+    ASSERT_NEAR(c.shared_error.squaredNorm(), sum, 1e-9 * (1 + sum));
+    if (!(before.T > 0) || c.resting > Column::kResting) continue;
+    // T = |Σ g|/√(Σ n² + Σ e²)
+    const double scatter2 = std::pow(before.score / before.T, 2);
+    EXPECT_NEAR(c.T, std::abs(c.score) / std::sqrt(scatter2 + sum), 1e-6 * before.T) << k;
+    larger += sum > 0.01 * scatter2 ? 1 : 0;
+    ++compared;
+  }
+  for (const int columns : reached) EXPECT_GT(columns, 10);
+  EXPECT_GT(larger, 10);
+  EXPECT_GT(compared, 50);
 }
 
 }  // namespace
