@@ -72,6 +72,17 @@ TEST(ExplainReport, hands_on_a_named_effect_with_evidence_proof_and_use) {
   EXPECT_EQ(html.find("slow_1.csv (fitted)"), std::string::npos) << "a fitted run stands in the proof";
 }
 
+TEST(ExplainReport, speaks_in_names_and_says_by_how_much_the_baseline_moved) {
+  Explanation e = named_sample();
+  const std::string html = page_of(e, "words");
+  expect_parts(html, {"ruled out: 4.1 sigma behind Coulomb friction", "−83<", "In words"});
+  EXPECT_EQ(html.find("behind coulomb_friction"), std::string::npos);
+  for (auto& change : e.base_changes) change.sentence.clear();
+  const std::string short_page = page_of(e, "no_words");
+  expect_parts(short_page, {"−83<"});
+  EXPECT_EQ(short_page.find("In words"), std::string::npos) << "a column of dashes";
+}
+
 TEST(ExplainReport, shows_what_cannot_be_told_apart_and_the_experiment_that_would) {
   const std::string html = page_of(tied_sample(Verdict::kNotSeparable), "not_separable");
   expect_parts(html,

@@ -103,6 +103,8 @@ TEST(Text, writes_units_and_names_for_people) {
   EXPECT_EQ(pretty_sentence("k3 = 0.401 N m/rad3, 3 kg/cm2; m2, s2x, J2 and cm22 stay"),
             "k3 = 0.401 N m/rad³, 3 kg/cm²; m2, s2x, J2 and cm22 stay");
   EXPECT_EQ(pretty_sentence("0.02 kg m2"), "0.02 kg m²");
+  EXPECT_EQ(pretty_sentence("-0.4 rad (-3 to 1), slow_dp-1.5.csv, half-open"),
+            "−0.4 rad (−3 to 1), slow_dp-1.5.csv, half-open");
   EXPECT_EQ(number(-0.00004), "−4.000 · 10⁻⁵");
   EXPECT_EQ(fixed_decimals(-0.001, 2), "0.00");
   EXPECT_EQ(whole(1234567), "1\u202F234\u202F567");

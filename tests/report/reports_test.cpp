@@ -114,6 +114,16 @@ TEST(JointReport, escapes_names_from_files) {
   EXPECT_NE(html.find("a&lt;b&gt;&amp;&quot;&#39;`{_^.csv"), std::string::npos);
 }
 
+TEST(JointReport, sets_commands_as_code_and_keeps_a_sign_with_its_digits) {
+  JointSample sample;
+  add_run(sample, "slow_dp-1.5.csv", 0.5, 0.0, 10, false, 1);
+  finish(sample);
+  const std::string html = render_joint_report(sample.input());
+  EXPECT_NE(html.find("<code>isac-identify "), std::string::npos);
+  EXPECT_EQ(html.find('`'), std::string::npos);
+  EXPECT_NE(html.find("slow_\u200bdp-\u20601.\u20605.\u200bcsv"), std::string::npos);
+}
+
 TEST(JointReport, refuses_a_pressure_unit_that_is_none) {
   const JointSample sample = joint_sample(0.02);
   JointReportInput input = sample.input();

@@ -60,6 +60,20 @@ const char* class_of(BoxKind kind) {
   return "note";
 }
 
+/// Escaped, and what stands between backticks as code: commands to type, in sentences.
+std::string prose(const std::string& text) {
+  std::string out;
+  const std::string safe = escape(text);
+  for (std::size_t at = 0; at < safe.size();) {
+    const auto open = safe.find('`', at);
+    const auto close = open == std::string::npos ? open : safe.find('`', open + 1);
+    if (close == std::string::npos) return out + safe.substr(at);
+    out += safe.substr(at, open - at) + "<code>" + safe.substr(open + 1, close - open - 1) + "</code>";
+    at = close + 1;
+  }
+  return out;
+}
+
 /// White at 0, blue towards −1, orange towards +1: both readable under black text.
 std::string shade(double r) {
   const double t = std::min(1.0, std::abs(r));
@@ -80,7 +94,7 @@ void Document::subheading(const std::string& text) {
   block("<h3>" + escape(text) + "</h3>\n");
 }
 void Document::paragraph(const std::string& text) {
-  block("<p>" + escape(text) + "</p>\n");
+  block("<p>" + prose(text) + "</p>\n");
 }
 
 void Document::equation(const std::vector<std::string>& lines) {
@@ -92,12 +106,13 @@ void Document::equation(const std::vector<std::string>& lines) {
 void Document::bullets(const std::vector<std::string>& items) {
   if (items.empty()) return;
   std::string out = "<ul>\n";
-  for (const std::string& item : items) out += "<li>" + escape(item) + "</li>\n";
+  for (const std::string& item : items) out += "<li>" + prose(item) + "</li>\n";
   block(out + "</ul>\n");
 }
 
 void Document::cards(const std::vector<Card>& items) {
-  std::string out = "<div class=\"cards\">\n";
+  constexpr std::size_t kInARow = 5;  // a sixth alone below them reads like an afterthought
+  std::string out = items.size() > kInARow ? "<div class=\"cards halves\">\n" : "<div class=\"cards\">\n";
   for (const Card& card : items) {
     out += "<div class=\"card\"><div class=\"label\">" + escape(card.label) + "</div><div class=\"value\">" +
            escape(card.value) + "</div>";
@@ -174,10 +189,10 @@ void Document::box(BoxKind kind, const std::string& title, const std::vector<std
   std::string out = std::string("<div class=\"box ") + class_of(kind) + "\"><div class=\"title\">" +
                     escape(title) + "</div>";
   if (items.size() == 1) {
-    out += "<p>" + escape(items.front()) + "</p>";
+    out += "<p>" + prose(items.front()) + "</p>";
   } else {
     out += "<ul>";
-    for (const std::string& item : items) out += "<li>" + escape(item) + "</li>";
+    for (const std::string& item : items) out += "<li>" + prose(item) + "</li>";
     out += "</ul>";
   }
   block(out + "</div>\n");

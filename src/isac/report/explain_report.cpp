@@ -34,6 +34,21 @@ std::string name_of(const std::string& id) {
   return effect < 0 ? id : models::effect_catalogue()[static_cast<std::size_t>(effect)].term;
 }
 
+/// A sentence as the progress lines have it, with the catalogue's names in place of ids.
+std::string with_names(const std::string& sentence) {
+  const auto in_id = [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; };
+  std::string out;
+  for (std::size_t i = 0; i < sentence.size();) {
+    std::size_t end = i;
+    while (end < sentence.size() && in_id(sentence[end])) ++end;
+    const std::string word = sentence.substr(i, end - i);
+    out += word.find('_') == std::string::npos ? word : name_of(word);
+    if (end < sentence.size()) out += sentence[end++];
+    i = end;
+  }
+  return out;
+}
+
 /// "p = 0.41", "p < 0.001".
 std::string chance(double p) {
   const std::string text = probability(p);
@@ -261,12 +276,18 @@ void add_numbers(Document& page, const Explanation& e) {
   }
   add_parameters(page, added, e.adds() ? "Parameters of what was added." : "Parameters of what was named.");
   if (!e.adds()) return;
-  Table table{.caption = "What the baseline had stood in for.",
-              .columns = {{"Parameter"}, {"Before", true}, {"After", true}, {"Unit"}, {"Change"}}};
+  const bool told = std::any_of(e.base_changes.begin(), e.base_changes.end(),
+                                [](const explain::BaseChange& change) { return !change.sentence.empty(); });
+  Table table{.caption = told ? "What the baseline had stood in for."
+                              : "The baseline without and with what was added.",
+              .columns = {{"Parameter"}, {"Before", true}, {"After", true}, {"Unit"}, {"Change (%)", true}}};
+  if (told) table.columns.push_back({"In words"});
   for (const explain::BaseChange& change : e.base_changes) {
+    const double moved = change.after - change.before;
     table.rows.push_back({change.name, number(change.before, 4), number(change.after, 4),
                           pretty_unit(change.unit),
-                          change.sentence.empty() ? "–" : pretty_sentence(change.sentence)});
+                          moved == 0 ? "0" : number(100 * moved / std::abs(change.before), 2)});
+    if (told) table.rows.back().push_back(change.sentence.empty() ? "–" : pretty_sentence(change.sentence));
   }
   if (!table.rows.empty()) page.table(table);
 }
@@ -277,12 +298,12 @@ void add_use(Document& page, const ExplainReportInput& input) {
   if (!input.compensation.empty()) page.bullets(input.compensation);
   if (input.params_file.empty()) {
     page.paragraph(
-        "isac-explain -o params.toml writes the effects where the simulator, the tables and the controller "
+        "`isac-explain -o params.toml` writes the effects where the simulator, the tables and the controller "
         "read them.");
     return;
   }
-  page.paragraph("The simulated rig has what was found with --card sim:params=" + input.params_file +
-                 "; isac-identify export " + input.params_file + " makes the controller's tables.");
+  page.paragraph("The simulated rig has what was found with `--card sim:params=" + input.params_file +
+                 "`; `isac-identify export " + input.params_file + "` makes the controller's tables.");
 }
 
 std::string planned(double value, const char* unit) {
@@ -301,8 +322,8 @@ void add_next(Document& page, const ExplainReportInput& input) {
                     fixed_decimals(next.separation_expected, 1) + " σ expected after it.");
   }
   if (!input.plan_file.empty() && !next.runs.empty())
-    lines.push_back("isac-log --plan " + input.plan_file +
-                    " --rig rig.toml -o DATASET records it; then call isac-explain DATASET again.");
+    lines.push_back("`isac-log --plan " + input.plan_file +
+                    " --rig rig.toml -o DATASET` records it; then call `isac-explain DATASET` again.");
   page.box(BoxKind::kNext, "Next experiment", lines);
   Table table{.caption = "The runs.",
               .columns = {{"No.", true},
@@ -363,7 +384,8 @@ void add_trials(Document& page, const Explanation& e) {
                  "any colour.");
   std::vector<std::string> lines;
   for (const explain::TrialNote& trial : e.trials)
-    lines.push_back((trial.id.empty() ? "" : name_of(trial.id) + ": ") + pretty_sentence(trial.sentence));
+    lines.push_back((trial.id.empty() ? "" : name_of(trial.id) + ": ") +
+                    pretty_sentence(with_names(trial.sentence)));
   if (!lines.empty()) page.bullets(lines);
 }
 

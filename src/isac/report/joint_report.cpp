@@ -41,12 +41,18 @@ void add_key_figures(Document& page, const JointView& view) {
   page.cards(cards);
 }
 
-/// A file's name that may be broken behind its punctuation, so that the table stays within the page.
+/// A file's name that may be broken behind its punctuation, so that the table stays within the page; a number's sign and point stay
+/// with their digits.
 std::string breakable(const std::string& name) {
+  const auto is_digit = [&](std::size_t i) { return i < name.size() && name[i] >= '0' && name[i] <= '9'; };
   std::string out;
-  for (const char c : name) {
-    out += c;
-    if (c == '_' || c == '-' || c == '.') out += "\u200b";
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    out += name[i];
+    const bool in_number = (name[i] == '-' || name[i] == '.') && is_digit(i + 1);
+    if (in_number)
+      out += "\u2060";  // a browser breaks behind a hyphen of its own accord
+    else if (name[i] == '_' || name[i] == '-' || name[i] == '.')
+      out += "\u200b";
   }
   return out;
 }
@@ -170,10 +176,9 @@ void add_next_steps(Document& page, const JointView& view) {
   if (std::any_of(view.fit->tests.begin(), view.fit->tests.end(),
                   [](const auto& test) { return !test.passed; }))
     next.push_back(
-        "A test of the residual is not passed: fit again with the term that its sentence names "
-        "(`isac-identify "
-        "joint --terms …`, terms in docs/effects.md) and keep it if the held-out runs are then predicted "
-        "better.");
+        "A test of the residual is not passed: let `isac-explain` name what is missing, or fit again with "
+        "the term that its sentence names (`isac-identify joint --terms …`, terms in docs/effects.md), and "
+        "keep it if the held-out runs are then predicted better.");
   next.insert(next.end(), view.input->next_steps.begin(), view.input->next_steps.end());
   if (next.empty())
     next.push_back(

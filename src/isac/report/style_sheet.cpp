@@ -13,10 +13,12 @@ h2 { font-size: 19px; margin: 40px 0 10px; padding-bottom: 4px; border-bottom: 1
 h3 { font-size: 15.5px; margin: 26px 0 6px; font-weight: 600; }
 p { margin: 8px 0; max-width: 76ch; }
 ul { margin: 6px 0; padding-left: 20px; } li { margin: 3px 0; }
+code { font: 0.93em "DejaVu Sans Mono", "Liberation Mono", monospace; background: #eef1f4; padding: 0 3px; border-radius: 2px; }
 .subtitle { color: #555; margin: 0 0 20px; }
 .equation { margin: 14px 0; padding: 12px 18px; border-left: 3px solid #0072b2; background: #f6f8fa; font: 16.5px/1.75 "STIX Two Text", "Times New Roman", "Liberation Serif", "DejaVu Serif", serif; overflow-x: auto; }
 .equation div:not(:first-child) { font-size: 15px; color: #333; }
 .cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(130px, 1fr)); gap: 10px; margin: 16px 0; }
+.cards.halves { grid-template-columns: repeat(auto-fill, minmax(230px, 1fr)); }
 .card { border: 1px solid #dcdcdc; border-radius: 4px; padding: 10px 14px; }
 .card .label { font-size: 12.5px; color: #555; }
 .card .value { font-size: 17.5px; font-weight: 600; font-variant-numeric: tabular-nums; white-space: nowrap; }

@@ -143,10 +143,17 @@ std::string pretty_sentence(std::string_view sentence) {
   const auto is_word = [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
   };
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   std::string out;
   for (std::size_t i = 0; i < sentence.size();) {
     const std::string_view rest = sentence.substr(i);
     const bool begins = i == 0 || !is_word(sentence[i - 1]);
+    const bool stands_free = i == 0 || sentence[i - 1] == ' ' || sentence[i - 1] == '(';
+    if (stands_free && rest.size() > 1 && rest[0] == '-' && is_digit(rest[1])) {
+      out += "−";
+      ++i;
+      continue;
+    }
     const auto unit = std::find_if(kUnits.begin(), kUnits.end(), [&](std::string_view u) {
       return begins && rest.starts_with(u) && (rest.size() == u.size() || !is_word(rest[u.size()]));
     });

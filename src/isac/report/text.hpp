@@ -28,7 +28,7 @@ struct Rounded {
 
 /// "N cm2/kg" → "N cm²/kg"; "-" and "1" → "".
 [[nodiscard]] std::string pretty_unit(std::string_view unit);
-/// The same of units within a sentence: "0.401 N m/rad3" → "0.401 N m/rad³".
+/// The same of units within a sentence, and a true minus sign: "-0.401 N m/rad3" → "−0.401 N m/rad³".
 [[nodiscard]] std::string pretty_sentence(std::string_view sentence);
 /// Invalid UTF-8 and control characters replaced, so that names from foreign files cannot break a document.
 [[nodiscard]] std::string clean_utf8(std::string_view text);
