@@ -11,7 +11,6 @@
 
 #include "isac/core/units.hpp"
 #include "isac/estimate/linear_algebra.hpp"
-#include "isac/explain/screen.hpp"
 
 namespace isac::explain {
 namespace {

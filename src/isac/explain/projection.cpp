@@ -91,6 +91,26 @@ ISAC_SIMD void subtract_block(const double* basis, double* x, std::ptrdiff_t hei
 
 }  // namespace
 
+Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
+  Eigen::MatrixXd scaled = sensitivities;
+  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
+    const double norm = scaled.col(j).norm();
+    if (norm > 0) scaled.col(j) /= norm;
+  }
+  // Gram–Schmidt twice: columns are few, and nearly dependent ones must fall away instead of becoming noise.
+  Eigen::MatrixXd q(scaled.rows(), scaled.cols());
+  Eigen::Index count = 0;
+  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
+    Eigen::VectorXd v = scaled.col(j);
+    for (int round = 0; round < 2; ++round)
+      for (Eigen::Index k = 0; k < count; ++k) v -= q.col(k).dot(v) * q.col(k);
+    const double norm = v.norm();
+    if (norm > 1e-7) q.col(count++) = v / norm;
+  }
+  q.conservativeResize(scaled.rows(), count);
+  return q;
+}
+
 void take_out(const Eigen::MatrixXd& basis, Eigen::MatrixXd& x) {
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(basis.cols(), x.cols());
   for (Eigen::Index from = 0; from < x.rows(); from += kRowsAtOnce)

@@ -18,6 +18,10 @@
 
 namespace isac::explain {
 
+/// Orthonormal basis of the fitted parameters' sensitivities.
+[[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);
+
+/// x ← x − B (Bᵀ x).
 void take_out(const Eigen::MatrixXd& basis, Eigen::MatrixXd& x);
 
 /// r′; `block_of_row`: 0 … blocks − 1, in any order. What a block alone tells of stays as it is: nothing is left of it to be scaled.

@@ -7,7 +7,7 @@
 
 #include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/bounded_fit.hpp"
-#include "isac/explain/screen.hpp"
+#include "isac/explain/projection.hpp"
 
 namespace isac::explain {
 namespace {

@@ -5,8 +5,8 @@
 #include <functional>
 #include <utility>
 
-#include "isac/estimate/linear_algebra.hpp"
 #include "isac/explain/projection.hpp"
+#include "isac/explain/signed_fit.hpp"
 #include "isac/explain/workers.hpp"
 
 namespace isac::explain {
@@ -32,45 +32,6 @@ std::vector<Values> directions(const Hypothesis& h, const Values& shape) {
     all.push_back(v);
   }
   return all;
-}
-
-/// Least squares within signs: the best subset of columns whose amplitudes are allowed (at most four columns).
-struct SignedFit {
-  double gain = 0;
-  Eigen::VectorXd amplitude;
-};
-
-SignedFit signed_fit(const Eigen::MatrixXd& gram, const Eigen::VectorXd& score,
-                     const std::vector<bool>& positive_only) {
-  const int n = static_cast<int>(score.size());
-  SignedFit best;
-  best.amplitude = Eigen::VectorXd::Zero(n);
-  for (int mask = 1; mask < (1 << n); ++mask) {
-    std::vector<int> use;
-    for (int i = 0; i < n; ++i)
-      if ((mask >> i & 1) != 0 && gram(i, i) > 0) use.push_back(i);
-    if (use.empty()) continue;
-    const auto k = static_cast<Eigen::Index>(use.size());
-    Eigen::MatrixXd g(k, k);
-    Eigen::VectorXd s(k);
-    for (Eigen::Index i = 0; i < k; ++i) {
-      s[i] = score[use[static_cast<std::size_t>(i)]];
-      for (Eigen::Index j = 0; j < k; ++j)
-        g(i, j) = gram(use[static_cast<std::size_t>(i)], use[static_cast<std::size_t>(j)]);
-      g(i, i) *= 1 + 1e-6;
-    }
-    const Eigen::VectorXd a = estimate::solve_symmetric(g, s);
-    bool allowed = a.allFinite();
-    for (Eigen::Index i = 0; i < k && allowed; ++i)
-      allowed = !positive_only[static_cast<std::size_t>(use[static_cast<std::size_t>(i)])] || a[i] >= 0;
-    if (!allowed) continue;
-    const double gain = s.dot(a);
-    if (gain <= best.gain) continue;
-    best.gain = gain;
-    best.amplitude.setZero();
-    for (Eigen::Index i = 0; i < k; ++i) best.amplitude[use[static_cast<std::size_t>(i)]] = a[i];
-  }
-  return best;
 }
 
 /// So many columns of doubles are few beside what a search keeps as floats, and so many tasks leave no thread without work.
@@ -372,26 +333,6 @@ class Screening {
 };
 
 }  // namespace
-
-Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities) {
-  Eigen::MatrixXd scaled = sensitivities;
-  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
-    const double norm = scaled.col(j).norm();
-    if (norm > 0) scaled.col(j) /= norm;
-  }
-  // Gram–Schmidt twice: columns are few, and nearly dependent ones must fall away instead of becoming noise.
-  Eigen::MatrixXd q(scaled.rows(), scaled.cols());
-  Eigen::Index count = 0;
-  for (Eigen::Index j = 0; j < scaled.cols(); ++j) {
-    Eigen::VectorXd v = scaled.col(j);
-    for (int round = 0; round < 2; ++round)
-      for (Eigen::Index k = 0; k < count; ++k) v -= q.col(k).dot(v) * q.col(k);
-    const double norm = v.norm();
-    if (norm > 1e-7) q.col(count++) = v / norm;
-  }
-  q.conservativeResize(scaled.rows(), count);
-  return q;
-}
 
 bool Responses::hold(const Fit& fit, const Hypothesis& h) noexcept {
   const bool smooth_torque = h.info().hook == models::Hook::kTorque && !h.dry;

@@ -179,9 +179,6 @@ void judge(Screen& screen, const Prepared& data, const Library& library, const S
 /// is the flips'; beyond it nearly all. Valid by the union bound, as both shares grow with the level.
 [[nodiscard]] double joint_p(double flips, double rare, double level) noexcept;
 
-/// Orthonormal basis of the fitted parameters' sensitivities.
-[[nodiscard]] Eigen::MatrixXd basis_of(const Eigen::MatrixXd& sensitivities);
-
 /// p-value of the largest |Σ g|/√Σ g² over columns (rows: blocks), or of a smaller statistic that stands for it, by joint sign flips of
 /// the blocks.
 struct FlipTest {
