@@ -9,6 +9,7 @@
 #include <random>
 
 #include "isac/explain/filters.hpp"
+#include "isac/explain/projection.hpp"
 #include "isac/explain/proof.hpp"
 #include "isac/explain/screen.hpp"
 #include "tied_data.hpp"
