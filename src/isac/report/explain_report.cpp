@@ -34,7 +34,7 @@ std::string name_of(const std::string& id) {
   return effect < 0 ? id : models::effect_catalogue()[static_cast<std::size_t>(effect)].term;
 }
 
-/// A sentence as the progress lines have it, with the catalogue's names in place of ids.
+/// A sentence as the progress lines have it, with the catalogue's names in place of ids of several words; "creep" is a word already.
 std::string with_names(const std::string& sentence) {
   const auto in_id = [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; };
   std::string out;
